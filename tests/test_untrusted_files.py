@@ -18,7 +18,7 @@ MAKES_CODE = {"engine/compile.py", "registry.py"}
 TEXT_RUNS, FILE_RUNS = {"eval", "exec", "compile", "__import__"}, {"exec_module", "spec_from_file_location"}
 # Read with pickle: what the compiler wrote into a folder that nobody else may write, after its digest is checked; and
 # what a worker, which runs the user's own code, sends through its pipe.
-READS_PICKLES = {"engine/cache.py", "study/pool.py"}
+READS_PICKLES = {"engine/compile.py", "study/pool.py"}
 UNPICKLES = {"pickle", "cPickle", "dill", "cloudpickle", "marshal", "shelve", "yaml"}
 EVIL = "from pathlib import Path\nPath('touched').touch()\nthing = 1\n"
 CAMPAIGN = f'name = "c"\nplant = "{{plant}}"\neffects = {{effects}}\n{LOWERING}'

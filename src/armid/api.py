@@ -390,10 +390,15 @@ def close_loop(
     left_out = effects_of(without, known, "without") if without else {}
     kept = {name: effect for name, effect in wanted.items() if name not in left_out}
     own = setup.registry.own["effects"] if candidates is None else kept
-    for name in own.keys() & kept.keys():
-        refusals = [refusal_of(form, setup.model.plant) for form in kept[name].every_form]
-        if all(refusals):
-            warnings.warn(f"effect '{name}' is not looked for: {refusals[0]}", stacklevel=2)
+    refusals = {name: [refusal_of(form, setup.model.plant) for form in kept[name].every_form]
+                for name in kept if name in own}  # fmt: skip
+    refused = {name: reasons[0] for name, reasons in refusals.items() if all(reasons)}
+    if candidates is not None and refused.keys() == kept.keys() != set():
+        raise ArmidError(
+            f"candidates: {next(iter(refused.values()))}: an effect that can act on this plant is expected"
+        )
+    for name, reason in refused.items():
+        warnings.warn(f"effect '{name}' is not looked for: {reason}", stacklevel=2)
     values = {**(fixed or {}), **setup.fixed}
     chances = {name: float(p) for name, p in (priors or {}).items() if not isinstance(p, Sequence)}
     known_too = with_known(setup.campaign, {name: p for name, p in (priors or {}).items() if name not in chances})

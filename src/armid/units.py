@@ -31,7 +31,8 @@ ENDS = {
     "rpm": ("rad/s", TURN / 60.0, ("rpm", "1/min", "min-1")), "turns_s": ("rad/s", TURN, ("turns/s", "rev/s")),
     "counts_s": ("rad/s", np.nan, ("counts/s",)),
     "m": ("m", 1.0, ("m",)), "mm": ("m", 1e-3, ("mm",)), "m_s": ("m/s", 1.0, ("m/s",)),
-    "mm_s": ("m/s", 1e-3, ("mm/s",)), "A": ("A", 1.0, ("A",)), "N": ("N", 1.0, ("N",)),
+    "mm_s": ("m/s", 1e-3, ("mm/s",)), "m_min": ("m/s", 1.0 / 60.0, ("m/min",)),
+    "A": ("A", 1.0, ("A",)), "N": ("N", 1.0, ("N",)),
     "N_m": ("N m", 1.0, ("N m", "Nm", "N*m")), "V": ("V", 1.0, ("V",)),
 }  # fmt: skip
 # SI unit of an output -> {end of the header of a column: factor that turns the column into SI, NaN for counts}.

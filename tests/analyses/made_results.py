@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from armid.study.outcome import RunTrace
+from armid.study.store import RunTrace
 
 UNITS = {"p0": "Pa", "k": "1", "eta3": "1", "n": "1"}
 BOX = {"p0": (2.6e6, 3.5e6), "k": (0.6, 1.1), "eta3": (0.45, 0.70), "n": (0.9, 1.5)}

@@ -2,7 +2,7 @@
 
 import pandas as pd
 
-from armid.report.markdown import markdown
+from armid.report.files import markdown
 from armid.study.analyses.analysis import Evidence
 from armid.study.document import report_of
 from armid.study.results import load_study

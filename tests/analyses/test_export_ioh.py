@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from armid.study.export import WORST, export_ioh, lines
-from armid.study.outcome import RunTrace
+from armid.study.store import RunTrace
 
 
 def export(results, folder):

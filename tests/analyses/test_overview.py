@@ -24,8 +24,7 @@ from armid.study.analyses.errors import (
     valley_figure,
 )
 from armid.study.analyses.fitness_quality import fitness_quality, fitness_quality_figure
-from armid.study.analyses.loops import loop_runs
-from armid.study.analyses.overview import main_table, reasons, runs_table
+from armid.study.analyses.overview import loop_runs, main_table, reasons, runs_table
 from armid.study.analyses.success import SUCCESS, success, success_figure, success_rates, wilson
 from armid.study.analyses.table1 import TABLE1
 from armid.study.analyses.table2 import TABLE2

@@ -8,8 +8,7 @@ from armid.cli.new import python_file
 from armid.contract.check import check_thing
 from armid.errors import ArmidError
 from armid.registry import load_registry
-from armid.study.analyses.catalogue import ANALYSES, own_sections, parts_of
-from armid.study.document import report_of
+from armid.study.document import ANALYSES, own_sections, parts_of, report_of
 
 
 def test_the_starting_file_is_a_plug_in_that_becomes_a_section(made, tmp_path):

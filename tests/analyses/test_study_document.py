@@ -15,8 +15,7 @@ import pytest
 from made_results import BOX
 
 from armid.errors import ArmidError
-from armid.report.files import write_files
-from armid.report.markdown import markdown
+from armid.report.files import markdown, write_files
 from armid.study.document import report_of
 
 

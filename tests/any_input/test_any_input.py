@@ -23,7 +23,7 @@ from reading_whatever import (
 )
 
 from armid.cli.options import assignments, interval, intervals, numbers, value_of
-from armid.contract.identifier import Trial
+from armid.contract.check import Trial
 from armid.identifiers import IDENTIFIERS, identifier_of
 from armid.model import PLANTS, Model
 from armid.problem.meter import Meter, MeterTermination

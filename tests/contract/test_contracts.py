@@ -9,9 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from armid.contract.check import check_thing
+from armid.contract.check import check_identifier, check_thing
 from armid.contract.equations import check_effect, check_effects
-from armid.contract.identifier import check_identifier
 from armid.identifiers import IDENTIFIERS, identifier_of
 from armid.model import EFFECTS, PLANTS, applicable
 from armid.problem.fitness import FITNESS
@@ -46,7 +45,7 @@ def test_registered_things_keep_their_contract(kind, name, thing):
 @pytest.mark.parametrize("name", [name for name, i in IDENTIFIERS.items() if i.package])
 def test_identifiers_of_other_libraries_keep_their_contract(name, monkeypatch):
     pytest.importorskip(IDENTIFIERS[name].package)
-    monkeypatch.setattr("armid.contract.identifier.BUDGET", 140)
+    monkeypatch.setattr("armid.contract.check.BUDGET", 140)
     assert failures(check_identifier(IDENTIFIERS[name])) == []
 
 
@@ -82,7 +81,7 @@ OWN = [n for n, i in IDENTIFIERS.items() if not i.package]
 NAMES = (*OWN, "pso+bobyqa", "de+nelder_mead+sbplx", "cmaes+least_squares", "multistart:lbfgs")
 SCRIPT = """
 import hashlib, json, sys
-from armid.contract.identifier import BUDGET, Trial, run
+from armid.contract.check import BUDGET, Trial, run
 from armid.identifiers import IDENTIFIERS, identifier_of
 from armid.problem.meter import Meter
 found = {}

@@ -13,9 +13,8 @@ import pytest
 from pymoo.algorithms.soo.nonconvex.de import DE
 from pymoo.algorithms.soo.nonconvex.pattern import PatternSearch
 
-from armid.contract.check import check_fitness
+from armid.contract.check import check_fitness, check_identifier
 from armid.contract.equations import check_effect, check_effects, check_plant
-from armid.contract.identifier import check_identifier
 from armid.contract.trials import ContractPoint
 from armid.errors import ArmidError
 from armid.identifiers import as_identifier

@@ -18,10 +18,9 @@ from numba.core import codegen
 
 from armid.engine import cache_folder, compile_model, simulate
 from armid.engine import compile as compiler
-from armid.engine.cache import keep, read_whole, unusable, write_whole
-from armid.engine.compile import load_module, module_name
+from armid.engine.compile import keep, load_module, module_name, read_whole, unusable, write_whole
 from armid.engine.generate import kernel_parts
-from armid.engine.linked import LINKED, LinkedLibrary
+from armid.engine.simd import LINKED, LinkedLibrary
 from armid.model import EFFECTS, PLANTS, Effect, Manoeuvre, Model, Parameter
 
 SCRIPT = """

@@ -18,9 +18,8 @@ from armid.estimation.identifiability_document import (
     result_of,
     smooth,
 )
-from armid.estimation.information import information_at
+from armid.estimation.information import THRESHOLD, information_at
 from armid.estimation.least_squares import estimate
-from armid.estimation.profile import THRESHOLD
 from armid.model import EFFECTS
 from armid.problem.problem import replays
 from armid.problem.space import space_of

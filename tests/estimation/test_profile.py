@@ -6,8 +6,8 @@ from linear_records import linear_records
 from scipy.optimize import lsq_linear
 from scipy.stats import chi2
 
+from armid.estimation.information import THRESHOLD, profiles
 from armid.estimation.least_squares import fit
-from armid.estimation.profile import THRESHOLD, profiles
 
 
 def seen_by(design, z, rng):

@@ -14,7 +14,7 @@ from pymoo.optimize import minimize
 from searches import Bowl, asked_of, identifier, ran
 
 from armid.identifiers import IDENTIFIERS, as_identifier, identifier_of
-from armid.identifiers.chain import spread
+from armid.identifiers.catalogue import spread
 
 OWN = IDENTIFIERS | {
     "mine": as_identifier("mine", NelderMead), "evolution": as_identifier("evolution", lambda budget: DE(pop_size=10)),

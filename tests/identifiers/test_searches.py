@@ -15,12 +15,12 @@ from pymoo.problems.functional import FunctionalProblem
 from pymoo.util.display.single import SingleObjectiveOutput
 from searches import COMPOSED, Bowl, identifier, ran
 
-from armid.contract.identifier import Trial, run
+from armid.contract.check import Trial, run
 from armid.errors import ArmidError
 from armid.identifiers import IDENTIFIERS, as_identifier
 from armid.identifiers.identifier import declared
 from armid.identifiers.local import ByValues
-from armid.identifiers.pymoo_adapter import SearchAlgorithm
+from armid.identifiers.search import SearchAlgorithm
 from armid.problem.fitness import FITNESS
 from armid.problem.meter import Meter
 

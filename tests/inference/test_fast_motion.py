@@ -6,7 +6,7 @@ import pytest
 from armid.estimation.information import start_changes
 from armid.inference import prepared
 from armid.inference.checks import holdout_residuals
-from armid.inference.refit import unless_diverged
+from armid.inference.model import unless_diverged
 from armid.inference.whitening import WhiteRecords, whitened
 from armid.model import EFFECTS, Model
 from armid.problem.problem import replays

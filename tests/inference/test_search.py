@@ -11,9 +11,9 @@ from armid.inference.candidates import EffectKey
 from armid.inference.decisions import WINDOW
 from armid.inference.evidence import expansion_of, forecast
 from armid.inference.hypothesis import Hypothesis
-from armid.inference.kinds import records
+from armid.inference.kinds import faults
 from armid.inference.library import Library
-from armid.inference.refit import best_along
+from armid.inference.model import best_along
 from armid.inference.search import BEAM, MOST_EFFECTS, Exploration, drops, is_outdone, next_model
 from armid.model import EFFECTS, Model
 from armid.record import read_campaign
@@ -62,8 +62,8 @@ def test_a_fault_that_an_effect_makes_needless_is_dropped(stand, monkeypatch):
     assert {h.public for h in best} == {("effect", "supply_sag")}
     right = found.fits.pop(best)
     about = expansion_of(right, found.scale(), found.library)
-    monkeypatch.setattr(records, "MOVES", 0.0)
-    offset = next(p for p in records.propose(right, found.faults, found.library) if "offset" in p.hypothesis.name)
+    monkeypatch.setattr(faults, "MOVES", 0.0)
+    offset = next(p for p in faults.propose(right, found.faults, found.library) if "offset" in p.hypothesis.name)
     faulty = best | {offset.hypothesis}
     found.fits[faulty] = offset.refit(right, about, forecast(about, offset), np.inf)
     assert [f.unknown.name for f in found.fits[faulty].others] == [offset.hypothesis.name]

@@ -12,8 +12,8 @@ from armid.estimation.noise_model import coloured_level, white_level, yule_walke
 from armid.inference.checks import motion_phases, time_in_words
 from armid.inference.whitening import soundness
 from armid.model import Manoeuvre, Output
-from armid.record.noise import memory_of
 from armid.record.record import made_record
+from armid.record.sensor import memory_of
 
 TERMS = np.array([1.5, -0.7])
 

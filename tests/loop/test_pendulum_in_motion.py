@@ -6,6 +6,7 @@ from scipy.integrate import solve_ivp
 from scipy.signal import lfilter
 
 from armid.estimation.least_squares import with_fitted_starts
+from armid.inference import prepared
 from armid.loop import close_loop, report_of
 from armid.model import EFFECTS, Model
 from armid.problem.problem import replays
@@ -60,6 +61,26 @@ def test_the_start_of_an_axis_is_fitted(tmp_path):
         residual = replay.measured - replay.signal(np.array([[INERTIA]]))[0]
         assert np.sqrt(np.mean(residual**2)) == pytest.approx(NOISE, rel=0.1)
     assert not campaign.holdout[0].pieces[0].shown_start
+
+
+def test_a_pendulum_that_goes_over_the_top_is_estimated_from_the_begin_of_its_records(tmp_path):
+    """Simulated for long from a parameter that is a little off, it goes over the top another time."""
+    rng, times, tables = np.random.default_rng(1), STEP_S * np.arange(1200), {}
+    for i in range(2):
+        torque = np.repeat(rng.choice([-0.45, 0.0, 0.45], 12), 100)
+        torque[:100] = 0.0
+        angle, _ = swing(torque, 0.01, (0.0, 0.0))
+        tables[f"r{i}.csv"] = {"time_s": times, "angle_rad": angle + 1e-3 * rng.standard_normal(times.size),
+                               "drive_N_m": torque}  # fmt: skip
+    assert max(np.ptp(table["angle_rad"]) for table in tables.values()) > 2.0 * np.pi
+    toml = 'name = "over"\nplant = "rotary_arm"\nhold = "zero"\n'
+    toml += "".join(RECORD.format(file=file, role="train") for file in tables)
+    campaign = read_campaign(write_campaign(tmp_path / "c", toml, tables))
+    _, declared = prepared(Model(campaign.plant), campaign, {})
+    assert declared.x == pytest.approx([INERTIA, GRAVITY_MOMENT, 0.01], rel=1e-3)
+    assert declared.chi2 < 1.3 * len(declared.residual)
+    problem = declared.records
+    assert problem.begin(0.25).chi2(declared.z)[0] < 0.5 * problem.chi2(declared.z)[0]
 
 
 @pytest.mark.slow

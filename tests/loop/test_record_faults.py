@@ -12,9 +12,10 @@ from armid.inference.checks import mains_hum
 from armid.inference.kinds.faults import Fault
 from armid.loop import close_loop, report_of
 from armid.loop.document import conclusion
+from armid.loop.result import RecordFault, fault_sentence
 from armid.model import PLANTS, Model
 from armid.record import RecordWarning, read_campaign, write_table
-from armid.record.noise import noise_of
+from armid.record.sensor import noise_of
 from armid.record.table import read_table
 from changed_records import trimmed
 
@@ -171,3 +172,10 @@ def test_a_shift_is_undone_where_it_was_measured(campaign):
     assert inside.stop == record.pieces[0].window.stop - 7
     inner = slice(20, inside.stop - 20)
     assert np.abs(there.measured[inner] - record.measured[inner]).max() < 1e-6
+
+
+def test_a_drift_that_may_be_none_says_so():
+    drift = RecordFault("b.csv", "train", "trend", "freed", 1.5e-5, "N m", -1.70e-3, 1.73e-3, parameter="gravity")
+    assert "gravity is 1.5e-05 N m (-0.0017 to 0.00173) larger in b.csv" in fault_sentence(drift)
+    late = RecordFault("b.csv", "train", "late", "freed", -0.004, "s", -0.005, 0.001)
+    assert fault_sentence(late) == "b.csv: starts 4 ms early (-1 to 5); corrected."

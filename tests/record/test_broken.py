@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from armid.record.broken import after_sudden, repeated_samples, wild_samples
-from armid.record.sensor import Sensor
+from armid.record.sensor import Sensor, after_sudden, repeated_samples, wild_samples
 
 N, NOISE = 1200, 0.005
 TIMES = 1e-3 * np.arange(N)

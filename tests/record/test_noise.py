@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from armid.record.noise import difference_rms, noise_of, rest_between
+from armid.record.sensor import difference_rms, noise_of, rest_between
 
 INTERVAL = 0.001
 MOTION = np.sin(3 * np.arange(2000) * INTERVAL) * 2.5
@@ -106,3 +106,29 @@ def test_a_rest_between_motions_tells_the_noise_where_the_input_is_still_too(rng
     assert rest_between(measured + 1.0, still, True).size == 0
     assert rest_between(3.0 * np.sin(np.arange(3000) / 40.0), still, True).size == 0
     assert rest_between(measured + 1.0, still, False).size >= 200
+
+
+def test_a_machine_that_swings_freely_is_not_at_rest(rng):
+    time = np.arange(1600) / 200.0
+    still, noise = np.ones(time.size, dtype=bool), rng.normal(0, 0.001, time.size)
+    for period, memory in ((1.2, 20.0), (1.2, 1e9), (0.1, 0.5), (0.05, 5.0), (7.0, 30.0)):
+        swing = np.exp(-time / memory) * np.sin(2 * np.pi * time / period) + noise
+        assert rest_between(swing, still, is_speed=False).size < time.size
+        assert rest_between(swing[:100], still[:100], is_speed=False).size == 0
+    # one that has come to rest tells the noise then
+    tail = rest_between(np.exp(-time / 0.1) * np.sin(2 * np.pi * time / 0.5) + noise, still, is_speed=False)
+    assert tail.size in (400, 800)
+    assert np.std(tail) == pytest.approx(0.001, rel=0.1)
+    # noise of a filtered sensor is a rest, in nearly all of 200
+    coloured = lfilter([1.0], [1.0, -0.8], rng.normal(0, 1, (200, 1000)))
+    kept = [rest_between(one, still[:1000], is_speed=False).size == 1000 for one in coloured]
+    assert np.mean(kept) > 0.97
+
+
+def test_a_coarse_sensor_tells_its_noise_by_the_motion_where_its_step_hides_it_at_rest(rng):
+    motion = 30.0 * MOTION + 8.0 * np.sin(9 * np.arange(MOTION.size) / 200.0)
+    for own in (0.3, 0.4, 0.5):
+        rests = np.round(rng.uniform(-0.5, 0.5, (20, 1)) + rng.normal(0, own, (20, 150)))
+        moved = np.round(motion + rng.normal(0, own, (20, motion.size)))
+        sized = [noise_of(rest, one, INTERVAL).rms for rest, one in zip(rests, moved, strict=True)]
+        assert np.array(sized) == pytest.approx(np.sqrt(own**2 + 1 / 12), rel=0.2)

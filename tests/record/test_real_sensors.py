@@ -13,9 +13,8 @@ from armid.model import Model
 from armid.problem.problem import replays
 from armid.problem.space import space_of
 from armid.record import RecordWarning, read_campaign
-from armid.record.broken import repeated_samples
 from armid.record.resample import timing_of
-from armid.record.sensor import Sensor
+from armid.record.sensor import Sensor, repeated_samples
 from armid.record.signal import signal_of
 from armid.record.table import read_table, time_column
 

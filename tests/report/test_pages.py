@@ -18,10 +18,8 @@ from armid.cli.report import LOOP, document_of, kind_in, refuse_damaged
 from armid.errors import ArmidError
 from armid.loop.document import chances_sentence, loop_document
 from armid.report.document import Document, Line, Listing, Section, Sentences, rmse_text, table, varying
-from armid.report.files import csv
+from armid.report.files import csv, latex, markdown
 from armid.report.html import html, inline
-from armid.report.latex import latex
-from armid.report.markdown import markdown
 from armid.report.style import legend_below, panels, row_names, svg_text, thinned
 from armid.report.terminal import show
 from armid.study.analyses.errors import error_map_figure, valley_figure

@@ -14,10 +14,9 @@ import pytest
 from small_study import RUNS_A_SEED, beside_cost, same_results
 
 from armid.errors import ArmidError, MachineError
-from armid.study.outcome import MissingRun
 from armid.study.results import load_study
 from armid.study.runner import run_study
-from armid.study.store import FILE_NAME
+from armid.study.store import FILE_NAME, MissingRun
 from armid.study.tasks import Study, perform
 
 SEEDS = 6

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from small_study import RUNS_A_SEED, same_results
 
-from armid.study.cases import clean_records
+from armid.study.cases import RunCache, clean_records
 from armid.study.results import load_study
-from armid.study.run_cache import RunCache
 from armid.study.runner import run_study
 from armid.study.tasks import read_study
 from armid.units import DEGREE
@@ -99,6 +98,13 @@ def test_random_truths_are_a_latin_hypercube_inside_the_margin(write_study):
     for name, (low, high) in cases[0].bounds.items():
         shares = (np.array([c.truth[name] for c in cases]) - low) / (high - low)
         assert sorted(((shares - 0.1) / 0.8 * 20).astype(int)) == list(range(20))
+
+
+def test_some_runs_are_chosen_by_the_names_of_tables(write_study, tmp_path):
+    file = write_study(1, change=('fitness = ["rmse", "similarity"]', 'fitness = ["rmse", "mae"]'))
+    results = run_study(file, jobs=1, out=tmp_path / "out", only="row 1/pso on m*")
+    assert set(results.runs["fitness"]) == {"mae"}
+    assert set(results.runs["case"]) == {"row 1"}
 
 
 def test_a_changed_file_keeps_what_it_still_asks_for(write_study, tmp_path):

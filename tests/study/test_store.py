@@ -11,9 +11,8 @@ from contextlib import closing
 import pytest
 
 from armid.errors import ArmidError
-from armid.study.outcome import DONE, Outcome, Planned
 from armid.study.results import load_study
-from armid.study.store import FILE_NAME, Store, connected, opened, transaction, translate_errors
+from armid.study.store import DONE, FILE_NAME, Outcome, Planned, Store, connected, opened, transaction, translate_errors
 
 DESCRIPTION = {"name": "made", "cases": []}
 

@@ -44,6 +44,8 @@ REFUSED = [
     ('plant = "shell_', 'plant = "shel_', "plant 'shel_transfer_arm' is unknown, did you mean 'shell_transfer_arm'?"),
     ("seeds = 2", 'seeds = 2\nreport = "tabel1"', "report 'tabel1' is unknown, did you mean 'table1'?"),
     ("seeds = 2", 'seeds = 2\nkind = "identfy"', "kind 'identfy' is unknown, did you mean 'identify'?"),
+    ('name = "pso+least_squares"', 'name = "pso"\nlabel = "mine"\nn_particles = 20',
+     "identifier 'mine': key 'n_particles' is an option of pso, options = { n_particles = ... } is expected"),
     ("velocity_limit = 0.2", "velocity_limt = 0.2", "identifier 'pso': "),
     ("velocity_limit = 0.2", 'velocity_limit = "wide"', "identifier 'pso': "),
     ('name = "pso+least_squares"', 'name = "pso+least_squares"\nfitness = "similarity"',

@@ -56,6 +56,12 @@ def written(tmp_path):
     return write
 
 
+def test_budgets_for_each_parameter_need_no_other(written):
+    study = read_study(written(**{"budget = 100\n": ""}))
+    assert {run.budget for run in study.plan()} == {m * len(c.bounds) for c in study.cases for m in (5, 30)}
+    assert study.description()["budget"] == 30
+
+
 def test_the_plan_has_each_problem_with_its_own_fitness_and_budgets_that_are_cut(written):
     study = read_study(written())
     planned = list(study.plan())
@@ -93,7 +99,7 @@ def test_a_report_in_words(written, tmp_path):
     assert [s.title for s in document.sections][:2] == ["Ranks by class of difficulty", "At any time"]
     first, second = document.said[:2]
     assert first.startswith("Budget 5 D, 6 cases: best is ")
-    assert "The paper's swarm (pso) comes" in second
+    assert "The paper's swarm (pso) is number" in second
     assert not any("too easy" in sentence for sentence in document.said)  # two identifiers do not tell
     # by hand: the mean rank is that of the medians over the seeds
     table = document.main[0].frame

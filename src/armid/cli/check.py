@@ -178,7 +178,7 @@ def versions() -> tuple[bool, str]:
 
 
 def cache() -> tuple[bool, str]:
-    from armid.engine.cache import cache_folder, unusable
+    from armid.engine.compile import cache_folder, unusable
 
     folder = cache_folder()
     why = unusable(folder)

@@ -74,7 +74,7 @@ def things_of(what: str, registry: Registry) -> dict[str, Any]:
     own: dict[str, Any] = dict(getattr(registry, what))
     if what != "analyses":
         return own
-    from armid.study.analyses.catalogue import ANALYSES
+    from armid.study.document import ANALYSES
 
     return {a.name: a for a in ANALYSES} | own
 

@@ -33,7 +33,7 @@ COMMANDS = {
     "close-loop": "campaign:close_loop_command", "identifiability": "campaign:identifiability_command",
     "list": "listing:list_command", "check": "check:check_command", "doctor": "check:doctor_command",
     "bench": "check:bench_command", "study": "study:study_command", "tune": "study:tune_command",
-    "report": "report:report_command", "import": "transfer:import_group", "export": "transfer:export_group",
+    "report": "report:report_command", "import": "report:import_group", "export": "report:export_group",
     "new": "new:new_command", "schema": "new:schema_command",
 }  # fmt: skip
 

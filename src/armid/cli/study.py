@@ -38,7 +38,7 @@ dask_option = click.option(
 )  # fmt: skip
 @click.option(
     "--only", default="*", metavar="CASE/IDENTIFIER",
-    help="Run these only; * and ? stand for any letters, CASE alone for all identifiers.",
+    help="Run these only, by their names in tables; * and ? stand for any letters, CASE alone for all identifiers.",
 )  # fmt: skip
 @click.option("--retry", is_flag=True, help="Perform failed runs anew.")
 @plugin_option

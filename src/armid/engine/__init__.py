@@ -3,14 +3,12 @@
 simulate: a population through a manoeuvre, and quantities along a motion. calibrate: how finely time is cut.
 generate, templates/kernel.py.jinja: the module of a model, its equations and the loop that integrates them.
 templates/delays.py.jinja, templates/history.py.jinja: what a module with late signals has besides.
-transpile: the source of an equation, made self-contained. compile: the module; cache: what of it is kept on disk.
-linked: functions of a module that are linked into others, and never made executable by themselves.
+transpile: the source of an equation, made self-contained. compile: the module, and what of it is kept on disk.
 simd, simd_math: vectors of candidates in numba, and their elementary functions.
 """
 
-from armid.engine.cache import cache_folder
 from armid.engine.calibrate import FINE, STANDARD, Calibration, accuracy_against, calibrate, golden_steps, probes
-from armid.engine.compile import compile_model
+from armid.engine.compile import cache_folder, compile_model
 from armid.engine.simulate import Prepared, Schedule, Simulation, along, prepare, simulate
 
 __all__ = [

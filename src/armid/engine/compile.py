@@ -3,24 +3,198 @@
 import gc
 import hashlib
 import linecache
+import os
+import pickle
 import re
+import stat
 import sys
+import tempfile
+import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from threading import RLock
 from types import ModuleType
 from typing import Any
 from weakref import WeakKeyDictionary
 
+import llvmlite
+import numba
+import numpy as np
+from numba.core.compiler import CompileResult
 from numba.core.errors import NumbaError, UnsupportedBytecodeError
+from numba.core.runtime import rtsys
+from numba.core.serialize import dumps
 
 from armid.engine import generate, simd, simd_math
-from armid.engine.cache import VERSIONS, keep, kept_in, read_whole, write_whole
 from armid.engine.generate import KernelParts, kernel_parts
 from armid.errors import ArmidError
 from armid.model import Model
 from armid.progress import announced
+
+VERSIONS = (numba.__version__, llvmlite.__version__, np.__version__, sys.version)
+DIGEST = hashlib.sha256().digest_size
+# A link is not followed, and a pipe without a writer is not waited for; what a system lacks is left out.
+SAFELY = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
+OTHERS_MAY_WRITE = stat.S_IWGRP | stat.S_IWOTH
+
+
+def kept(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Return a decorator that compiles a function as numba.njit does, and keeps the code until its file changes."""
+
+    def compiled(function: Callable[..., Any]) -> Any:
+        return keep(numba.njit(**options)(function), str(function.__code__.co_filename))
+
+    return compiled
+
+
+def keep(compiled: Any, of: str) -> Any:
+    """Return a compiled function that keeps its machine code; of: the file that it is made from, or a name for that."""
+    compiled._cache = KeptCode(compiled.py_func, of)
+    return compiled
+
+
+class KeptCode:
+    """Keep the machine code of one function, as numba asks for it: one file a signature and processor.
+
+    Each file begins with the digest of its name and content. A damaged file is removed and compiled again.
+    """
+
+    def __init__(self, function: Callable[..., Any], of: str) -> None:
+        self.function, self.of = function, of
+
+    @property
+    def cache_path(self) -> str | None:
+        folder = kept_in()
+        return None if folder is None else str(folder)
+
+    def load_overload(self, signature: Any, target: Any) -> Any:
+        """Return what was compiled before, None where nothing was.
+
+        Numba's own cache loads every typing and lowering rule first, which takes half of the time of a second start;
+        machine code needs the runtime alone, and numba loads the rest as soon as something is compiled.
+        """
+        path = self._path(signature, target.codegen())
+        content = None if path is None else read_whole(path)
+        if content is None:
+            return None
+        rtsys.initialize(target)
+        return CompileResult._rebuild(target, *pickle.loads(content))
+
+    def save_overload(self, signature: Any, compiled: Any) -> None:
+        """Keep what was compiled; code that numba may not keep, with addresses of this process in it, is left out."""
+        path = self._path(signature, compiled.library.codegen)
+        if path is not None and not compiled.library.has_dynamic_globals and not compiled.lifted:
+            try:
+                content = dumps(compiled._reduce())
+            except RuntimeError as error:  # Ctrl-C came while numba was handed the code, and was lost there
+                raise KeyboardInterrupt from error
+            write_whole(path, content)
+
+    def flush(self) -> None:
+        """Forget nothing: another signature or text has another file."""
+
+    enable = disable = flush
+
+    def _path(self, signature: Any, codegen: Any) -> Path | None:
+        folder = kept_in()
+        if folder is None:
+            return None
+        name = f"{self.function.__module__}.{self.function.__qualname__}"
+        key = repr((name, stamp_of(self.of), signature, codegen.magic_tuple(), VERSIONS))
+        return folder / f"armid_code_{self.function.__name__}_{hashlib.sha256(key.encode()).hexdigest()[:24]}.bin"
+
+
+@cache
+def stamp_of(of: str) -> str:
+    """Return the digest of a file; a name without a file stays as it is."""
+    return hashlib.sha256(Path(of).read_bytes()).hexdigest() if os.path.isfile(of) else of
+
+
+def read_whole(path: Path) -> bytes | None:
+    """Return what this user wrote into a file, None where it is not there, foreign or damaged, which removes it."""
+    try:
+        with open(os.open(path, SAFELY), "rb") as file:
+            if not is_private(os.fstat(file.fileno())):
+                return None
+            content = file.read()
+    except OSError:
+        return None
+    if seal(path, content[DIGEST:]) == content[:DIGEST]:
+        return content[DIGEST:]
+    with suppress(OSError):
+        path.unlink()
+    return None
+
+
+def is_private(entry: os.stat_result) -> bool:
+    """Tell whether an open file is a plain one that nobody but this user can have written: its code is run."""
+    is_own = not hasattr(os, "getuid") or (entry.st_uid == os.getuid() and not entry.st_mode & OTHERS_MAY_WRITE)
+    return stat.S_ISREG(entry.st_mode) and is_own
+
+
+def seal(path: Path, content: bytes) -> bytes:
+    """Return the digest of a file's name and content: a whole file under the name of another is damage too."""
+    return hashlib.sha256(path.name.encode() + b"/" + content).digest()
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Write a file with its digest before it, so that another process sees all of it or nothing; warn if it cannot."""
+    try:
+        with tempfile.NamedTemporaryFile(dir=path.parent, prefix="armid_", suffix=".part", delete=False) as part:
+            part.write(seal(path, content) + content)
+        os.replace(part.name, path)
+    except OSError as error:
+        tell(f"compiled code cannot be kept in {path.parent} ({error.strerror})")
+
+
+def cache_folder() -> Path:
+    """Return the folder of compiled code, whether it can be used or not.
+
+    It is one of this user inside the folder that ARMID_CACHE names, which may hold other things; else the user's cache.
+    """
+    given = os.environ.get("ARMID_CACHE")
+    if given:
+        return Path(given) / (f"armid-{os.getuid()}" if hasattr(os, "getuid") else "armid")
+    base = os.environ.get("XDG_CACHE_HOME") or (os.environ.get("LOCALAPPDATA") if os.name == "nt" else None)
+    try:
+        return (Path(base) if base else Path.home() / ".cache") / "armid"
+    except RuntimeError:
+        return Path(os.devnull) / "armid"
+
+
+def kept_in() -> Path | None:
+    """Return the folder of compiled code, None where none can be used, with one warning."""
+    folder = cache_folder()
+    why = unusable(folder)
+    if why:
+        tell(f"compiled code is not kept: {folder} cannot be used ({why}); ARMID_CACHE may name another folder")
+        return None
+    return folder
+
+
+@cache
+def tell(sentence: str) -> None:
+    warnings.warn(sentence, stacklevel=2)
+
+
+@cache
+def unusable(folder: Path) -> str:
+    """Return why a folder cannot keep compiled code, "" where it can.
+
+    Its permissions stay as they are: `is_private` judges each file, and others cannot write a file that it accepts.
+    """
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        # the second of a link is the folder that it leads to
+        if hasattr(os, "getuid") and {folder.lstat().st_uid, folder.stat().st_uid} != {os.getuid()}:
+            return "it is somebody else's"
+        with tempfile.TemporaryFile(dir=folder) as probe:
+            return "" if is_private(os.fstat(probe.fileno())) else "others may write into its files"
+    except OSError as error:
+        return error.strerror or str(error)
+
 
 UNCOMPILABLE = (NumbaError, UnsupportedBytecodeError)
 # One register of AVX-512, two of AVX2. Measured on the arm: 16 lanes are slower, because their values no longer fit.

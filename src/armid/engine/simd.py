@@ -1,18 +1,61 @@
-"""Vector of doubles for numba: one value per candidate, side by side in the registers of the processor.
-
-Every operation acts lane by lane, so a candidate's result does not depend on its neighbours.
-"""
+"""Vector of doubles for numba: one value per candidate, side by side in the registers of the processor."""
 
 import operator
 from collections.abc import Callable
 from typing import Any
 
 from llvmlite import ir
-from numba import types
+from numba import _dynfunc, types
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import CompilerBase, DefaultPassBuilder, _LowerResult
+from numba.core.compiler_machinery import register_pass
 from numba.core.errors import TypingError
+from numba.core.typed_passes import NativeLowering
 from numba.extending import intrinsic, lower_builtin, models, overload, register_model, type_callable
 
-from armid.engine.linked import LINKED
+
+class LinkedLibrary(JITCodeLibrary):  # type: ignore[misc]
+    """Hold the intermediate code of one function, without that of the functions that it calls."""
+
+    def finalize(self) -> None:
+        self._raise_if_finalized()
+        self._finalized = True
+
+
+@register_pass(mutates_CFG=True, analysis_only=False)
+class LinkedLowering(NativeLowering):  # type: ignore[misc]
+    """Lower a function into a library that is only linked."""
+
+    _name = "linked_lowering"
+
+    def run_pass(self, state: Any) -> bool:
+        state.library = LinkedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.flags.no_compile = True
+        super().run_pass(state)
+        library, lowered = state.library, state.cr
+        # Numba looks the function up by a name that could be called, were its address not 0.
+        module, name = lowered.fndesc.lookup_module(), state.func_id.func_name
+        key = _dynfunc.make_function(module, name, "", 0, lowered.env, (library,))
+        needed = tuple(dict.fromkeys([library, *library._linking_libraries]))
+        state.targetctx.insert_user_function(key, lowered.fndesc, needed)
+        state.cr = _LowerResult(lowered.fndesc, lowered.call_helper, cfunc=key, env=lowered.env)
+        return True
+
+
+class Linked(CompilerBase):  # type: ignore[misc]
+    """Compile as numba does, but for machine code."""
+
+    def define_pipelines(self) -> list[Any]:
+        passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
+        passes.passes = [(LinkedLowering if p is NativeLowering else p, text) for p, text in passes.passes]
+        passes._finalized = False
+        passes.finalize()
+        return [passes]
+
+
+# Options of numba.njit for a function that compiled functions alone call.
+LINKED = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": Linked}
+
 
 DOUBLE = ir.DoubleType()
 INT32 = ir.IntType(32)

@@ -14,8 +14,8 @@ import numba
 import numpy as np
 from numba.extending import overload
 
-from armid.engine.linked import LINKED
 from armid.engine.simd import (
+    LINKED,
     Lanes,
     any_above,
     exponent_of,

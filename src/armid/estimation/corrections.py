@@ -12,17 +12,18 @@ from armid.model import Array, Manoeuvre, ManoeuvreKey, Plant
 from armid.record import Piece, Record, Signal
 from armid.record.start import Track, state_shown
 
-IN_DEGREES, ANGULAR = 180.0 / np.pi, "angular"
+# Mistakes of one unit each; of angles and turning speeds, and of turning speeds alone.
+IN_DEGREES, ANGULAR, TURNING = 180.0 / np.pi, ("rad", "rad/s"), ("rad/s",)
 FACTORS = {
     -1.0: ("sign", "its sign looks inverted: with the other one"),
     IN_DEGREES: (ANGULAR, "57.3 times too small, as radians under a header in degrees are: in the other unit"),
     1.0 / IN_DEGREES: (ANGULAR, "57.3 times too large, as degrees under a header in radians are: in the other unit"),
     30.0 / np.pi: (
-        ANGULAR,
+        TURNING,
         "9.55 times too small, as a mistake between rad/s and revolutions per minute makes it: corrected",
     ),
-    np.pi / 30.0: (ANGULAR, "9.55 times too large, as revolutions per minute under a header in rad/s are: corrected"),
-    6.0: (ANGULAR, "6 times too small, as revolutions per minute under a header in deg/s are: corrected"),
+    np.pi / 30.0: (TURNING, "9.55 times too large, as revolutions per minute under a header in rad/s are: corrected"),
+    6.0: (TURNING, "6 times too small, as revolutions per minute under a header in deg/s are: corrected"),
     10.0: ("unit", "10 times too small: ten times as large"),
     0.1: ("unit", "10 times too large: a tenth as large"),
     1000.0: ("unit", "1,000 times too small, as thousands under a plain unit are: corrected"),
@@ -105,12 +106,13 @@ def corrections(plant: Plant, record: Record, shift: int) -> Iterator[Correction
 
 def corrections_of_sizes(plant: Plant, record: Record) -> Iterator[Correction]:
     for factor, (kind, words) in FACTORS.items():
+        own = "unit" if kind in (ANGULAR, TURNING) else kind
         for one in record.signals:
-            if kind != ANGULAR or one.unit.startswith("rad"):
+            if own == kind or one.unit in kind:
                 signal = f"{one.output} [{one.unit}]" if record.signals[1:] else f"{one.unit} signal"
-                yield Correction("unit" if kind == ANGULAR else kind, factor, f"the measured {signal}: {words}",
+                yield Correction(str(own), factor, f"the measured {signal}: {words}",
                            of_signals(plant, [one.output], lambda x, by=factor: [by * x], factor))  # fmt: skip
-        for name in (i.name for i in plant.inputs if kind != ANGULAR):
+        for name in (i.name for i in plant.inputs if own == kind):
             yield Correction("input", factor, f"input '{name}': {words}",
                        of_pieces(partial(with_input, name=name, factor=factor)))  # fmt: skip
     for factor, words in TIMES.items():

@@ -22,7 +22,7 @@ from armid.problem.problem import ReadyRecord
 from armid.problem.space import Space, space_of
 from armid.record import Campaign, Piece, Record
 from armid.record.campaign import scaled as scaled_plant
-from armid.record.noise import FEWEST_INDEPENDENT, correlation_sum
+from armid.record.sensor import FEWEST_INDEPENDENT, correlation_sum
 from armid.record.table import POSITIONS
 from armid.units import shown
 

@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 from armid.errors import ArmidError, nearest
 from armid.estimation.constants import columns_of, common_factors, products
 from armid.estimation.design import SHRINKAGE, VOLUME, WORST, Motions, Offer, expected_levels, manoeuvre_grid, offers
-from armid.estimation.information import SINGULAR, Information, information_at, information_of, normalised
+from armid.estimation.information import (
+    SINGULAR,
+    Information,
+    Profile,
+    information_at,
+    information_of,
+    normalised,
+    profiles,
+)
 from armid.estimation.least_squares import (
     WeightedRecords,
     estimate,
@@ -20,7 +28,6 @@ from armid.estimation.least_squares import (
     with_fitted_starts,
 )
 from armid.estimation.noise_model import Level, level_weights, levels_of
-from armid.estimation.profile import Profile, profiles
 from armid.model import Array, Model
 from armid.problem.problem import Replay, replays
 from armid.problem.space import Space

@@ -10,9 +10,8 @@ from armid.estimation.design import Offer, identity
 from armid.estimation.examine import Examination, Group, collinearity_index
 from armid.estimation.figures import PAIRS, pairs_of
 from armid.estimation.identify import versions_of
-from armid.estimation.information import normalised, sensitivities
+from armid.estimation.information import THRESHOLD, Profile, normalised, sensitivities
 from armid.estimation.noise_model import Level, level_weights
-from armid.estimation.profile import THRESHOLD, Profile
 from armid.model import Array
 from armid.report.document import (
     Column,

@@ -336,7 +336,4 @@ def noise_remark(replay: Replay) -> str:
     if noise.source == "rest":
         mean = shown(noise.mean or 0.0, unit)[0]
         return f"{text} and mean {mean:+.3g} {name} (shown, not subtracted) from {noise.n_samples} samples at rest."
-    return (
-        f"{text} from high-frequency differences of the motion, as fewer than 50 samples, or equal ones, were recorded "
-        "at rest."
-    )
+    return f"{text} from high-frequency differences of the motion, as no long rest, or too coarse a one, was recorded."

@@ -2,7 +2,7 @@
 
 Coloured noise (a 40 Hz gyro sampled at 1 kHz) holds far fewer independent samples than samples. A `NoiseModel` is an
 autoregression of the sensor's signal at rest, pooled over the records. A `Level` counts independent samples.
-What a single column tells of its noise when it is read stands in record/noise.py.
+What a single column tells of its noise when it is read stands in record/sensor.py.
 """
 
 from collections.abc import Sequence
@@ -20,8 +20,8 @@ from armid.model import Array, Plant
 from armid.problem.problem import Replay
 from armid.problem.space import Space
 from armid.record import Noise, Record
-from armid.record.noise import FEWEST_REST_SAMPLES, changing, correlation_sum, difference_rms, memory_of, new_share
 from armid.record.record import NOISE_FREE
+from armid.record.sensor import FEWEST_REST_SAMPLES, changing, correlation_sum, difference_rms, memory_of, new_share
 
 T = TypeVar("T")
 # The engine's own error is a 200,000th of the speed scale; a noise of ten times that hides it.

@@ -11,8 +11,7 @@ from pymoo.core.algorithm import Algorithm
 
 from armid.errors import ArmidError
 from armid.identifiers.identifier import SMALLEST_SHARE, Options, declared, option, options_in, population, share
-from armid.identifiers.pymoo_adapter import FiniteEvaluator, SearchOptions
-from armid.identifiers.search import SearchTask
+from armid.identifiers.search import FiniteEvaluator, SearchOptions, SearchTask
 from armid.model import Array
 from armid.problem.meter import PENALTY
 

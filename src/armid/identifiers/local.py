@@ -7,8 +7,7 @@ import nlopt
 import numpy as np
 
 from armid.identifiers.identifier import RANGE, declared, option, share
-from armid.identifiers.pymoo_adapter import SEEDS, SearchOptions
-from armid.identifiers.search import Calls, Height, NoFitnessError, SearchTask, local_search
+from armid.identifiers.search import SEEDS, Calls, Height, NoFitnessError, SearchOptions, SearchTask, local_search
 from armid.model import Array
 
 FORWARD, CENTRAL = "forward", "central"

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from armid.identifiers.identifier import OF_PYMOO, RANGE, declared, option, population, refuse_unknown
-from armid.identifiers.pymoo_adapter import SearchAlgorithm, SearchOptions
-from armid.identifiers.search import SearchTask
+from armid.identifiers.search import SearchAlgorithm, SearchOptions, SearchTask
 
 
 @dataclass(frozen=True)

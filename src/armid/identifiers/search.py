@@ -1,18 +1,27 @@
-"""What a search is: a function of a task, which asks for the fitness of candidates until the budget ends it.
+"""What a search is: a function of a task that asks for the fitness of candidates; and how pymoo runs it."""
 
-Also: the starts of local searches, and what protects the routines of other libraries.
-"""
-
+from abc import abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from math import inf, isfinite
-from typing import Any, NamedTuple, Protocol
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
+from pymoo.algorithms.base.local import LocalSearch
+from pymoo.core.algorithm import Algorithm
+from pymoo.core.evaluator import Evaluator
+from pymoo.core.individual import Individual
+from pymoo.core.initialization import Initialization
+from pymoo.core.population import Population
 from pymoo.core.problem import Problem
+from pymoo.core.result import Result
+from pymoo.core.termination import NoTermination
 
 from armid.errors import ArmidError
+from armid.identifiers.identifier import OF_PYMOO, OF_SETUP, Options, checked_count, refuse_unknown
 from armid.model import Array
+from armid.problem.meter import PENALTY, RESIDUALS, Metered
 
 # A start on a bound stalls the simplex.
 PULLED = 1e-3
@@ -144,3 +153,164 @@ def bounds_of(problem: Problem) -> tuple[Array, Array]:
     if not problem.has_bounds() or not np.isfinite([problem.xl, problem.xu]).all() or (problem.xl > problem.xu).any():
         raise ArmidError(f"the problem's bounds are {problem.xl} and {problem.xu}, expected a finite box")
     return problem.xl, problem.xu
+
+
+SEEDS = 2**31 - 1
+PLAIN = ["F", "G", "H"]
+
+
+class SearchAlgorithm(Algorithm):  # type: ignore[misc]
+    """Run a search where pymoo expects an algorithm; what the search asks for at once is one generation.
+
+    search: the search; budget: simulations after which the run ends when no termination is given. is_seeded: in a chain
+    it draws from a generator of its own, as pymoo's algorithms do. of_pymoo: options of pymoo's Algorithm, such as
+    termination, callback, seed. All that is random comes from `random_state`.
+    `opt` is the best candidate so far. The run ends when the search returns. A search runs as a whole, by pymoo's
+    `minimize` or by `run`; it refuses `ask` and `next`.
+    """
+
+    def __init__(self, search: Search, budget: int, is_seeded: bool = False, **of_pymoo: Any) -> None:
+        refuse_unknown(of_pymoo, OF_PYMOO, "the search")
+        super().__init__(**of_pymoo)
+        self.search, self.is_seeded, self.is_bare = search, is_seeded, not of_pymoo
+        self.budget = checked_count("the budget", budget)
+
+    def setup(self, problem: Problem, **options: Any) -> Algorithm:
+        """Make ready for a problem; options are pymoo's, and the unknown ones that pymoo would swallow are refused."""
+        refuse_unknown(options, OF_SETUP, "the search")
+        bounds_of(problem)
+        if options.get("termination", self.termination) is None:
+            options["termination"] = ("n_eval", self.budget)
+        return super().setup(problem, **options)
+
+    def run(self, is_over: Callable[[], bool] = lambda: False) -> Result:
+        """Search to the end; is_over: called after each generation, as the termination is."""
+        if self.problem is None or self.is_initialized:
+            raise ArmidError("the search has no problem, or has run before: setup(problem) of a new one is expected")
+        self._initialize()
+
+        def ask(X: Array, residuals: bool = False) -> Told:
+            infills = Population.new(X=X, **dict.fromkeys(("n_gen", "n_iter"), [self.n_iter] * len(X)))
+            self.evaluator.evaluate_values_of = [*PLAIN, RESIDUALS] if residuals else PLAIN
+            self.evaluator.eval(self.problem, infills, algorithm=self)
+            told = told_of(infills, residuals)
+            self.advance(infills=infills)
+            if not self.has_next() or is_over():
+                raise Dropped
+            return told
+
+        with suppress(Dropped):
+            self.search(SearchTask(self.problem, self.random_state, ask, self.budget))
+            self.termination.terminate()
+            self.finalize()
+        return self.result()
+
+    def infill(self) -> Population:
+        """Refuse to be asked for a generation."""
+        raise ArmidError("a search of armid has no ask() and tell(): minimize() or run() is expected")
+
+    next = infill
+
+    def _initialize_advance(self, infills: Population, **_: Any) -> None:
+        self.opt = Population.empty()
+        self._advance(infills)
+
+    def _advance(self, infills: Population, **_: Any) -> None:
+        self.pop = infills
+        values = told_of(infills, False).F
+        leader = int(np.argmin(values))
+        if values[leader] < (self.opt[0].F[0] if len(self.opt) else np.inf):
+            self.opt = infills[leader : leader + 1]
+
+    def _set_optimum(self) -> None:
+        """Leave `opt` as `_advance` has set it."""
+
+
+def told_of(infills: Population, residuals: bool) -> Told:
+    """Read what was evaluated; a failed candidate gets +inf. Kept residual vectors would fill the memory."""
+    f = np.array([individual.F[0] for individual in infills], dtype=np.float64)
+    f[~(f < PENALTY)] = np.inf
+    if not residuals:
+        return Told(f)
+    rows = [individual.data.pop(RESIDUALS, None) for individual in infills]
+    if any(row is None or np.ndim(row) != 1 for row in rows):
+        raise ArmidError("the problem gives no residual vectors, least_squares expects one that does")
+    return Told(f, np.array(rows, dtype=np.float64))
+
+
+class SearchOptions(Options):
+    """Options of a search of ours; is_seeded: see `SearchAlgorithm`."""
+
+    is_seeded: ClassVar[bool] = False
+
+    @abstractmethod
+    def search(self, task: SearchTask) -> None:
+        """Request candidates until the search converges or the task ends it."""
+
+    def build(self, budget: int) -> SearchAlgorithm:
+        """Return the search as an algorithm of pymoo."""
+        return SearchAlgorithm(self.search, budget, self.is_seeded)
+
+
+class FiniteEvaluator(Evaluator):  # type: ignore[misc]
+    """Replace fitness values that are not finite by PENALTY, for algorithms that cannot handle NaN."""
+
+    def eval(self, problem: Problem, pop: Population, *args: Any, **kwargs: Any) -> Population:
+        """Evaluate as pymoo does, then replace what is not finite."""
+        pop = super().eval(problem, pop, *args, **kwargs)
+        for individual in [pop] if isinstance(pop, Individual) else pop:
+            if not np.isfinite(individual.F).all():
+                individual.F = np.where(np.isfinite(individual.F), individual.F, PENALTY)
+        return pop
+
+
+def run(algorithm: Algorithm, problem: Metered, seed: int, is_over: Callable[[], bool]) -> None:
+    """Run an algorithm to its end, or until it is over; the problem's meter keeps what it found.
+
+    Asks for the same candidates in the same order as pymoo's `minimize` with this seed, bit for bit. is_over: called
+    after each evaluation of what was asked for at once, which is a generation of pymoo.
+    """
+    if isinstance(algorithm, SearchAlgorithm) and not algorithm.is_bare:
+        algorithm.setup(problem, termination=NoTermination(), seed=seed).run(is_over)
+        return
+    bounds_of(problem)
+
+    def ask(X: Array, residuals: bool = False) -> Told:
+        values, vectors = problem.answered(X, residuals)
+        if is_over():
+            raise Dropped
+        return Told(np.where(values < PENALTY, values, np.inf), vectors)
+
+    with suppress(Dropped):
+        carry_out(algorithm, SearchTask(problem, np.random.default_rng(seed), ask, 1), seed)
+
+
+def carry_out(algorithm: Algorithm, task: SearchTask, seed: int | None = None) -> None:
+    """Search as a fresh algorithm does, from the task's start if it has one; seed: of the run, None in a part of it."""
+    if isinstance(algorithm, SearchAlgorithm):
+        is_own = algorithm.is_seeded and seed is None
+        random = np.random.default_rng(int(task.random.integers(1, SEEDS))) if is_own else task.random
+        algorithm.search(replace(task, random=random, budget=algorithm.budget))
+        return
+    if isinstance(algorithm, LocalSearch) and task.start is not None:
+        algorithm.initialization = Initialization(task.start[np.newaxis])
+    elif task.start is not None:
+        algorithm.x0 = task.start.copy()
+    seed = int(task.random.integers(1, SEEDS)) if seed is None else seed
+    algorithm.setup(task.problem, termination=NoTermination(), seed=seed)
+    while algorithm.has_next():
+        asked = algorithm.ask()
+        infills = [] if asked is None else [asked] if isinstance(asked, Individual) else asked
+        fresh = [individual for individual in infills if "F" not in individual.evaluated]
+        # one that evaluates by itself asks for nothing here, and may be at its end all the same
+        X = np.array([individual.X for individual in fresh], dtype=np.float64)
+        told = task.ask(X.reshape(len(fresh), task.problem.n_var))
+        for individual, value in zip(fresh, np.minimum(told.F, PENALTY), strict=True):
+            individual.F = np.array([value])
+            individual.evaluated = {"F", "G", "H"}
+        algorithm.evaluator.n_eval += len(fresh)
+        algorithm.tell(infills=asked)
+
+
+def takes_start(algorithm: Algorithm) -> bool:
+    return isinstance(algorithm, SearchAlgorithm | LocalSearch) or hasattr(algorithm, "x0")

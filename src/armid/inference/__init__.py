@@ -8,14 +8,14 @@ library       the candidate effects, compiled together and ready to be tried; `c
 hypothesis    what the declared model of the machine and its records may lack
 decisions     prior beliefs, from calibration.toml, and all other numbers that decide
 kinds         the kinds of hypotheses, one file each: effects, faults of records, drifts, a signal without a form
-model         a model at its estimate; `unknowns`: constants, faults and drifts, fitted with their priors
+model         a model at its estimate, and refits of it; `unknowns`: constants, faults, drifts, with their priors
 evidence      how probable the records are in a model, and what a hypothesis more would do to that
 search        which models are fitted
 posterior     probabilities of hypotheses and sets; intervals that count what may be missing
 checks        whether a residual is more than noise, and where
 carry_over    what a model predicts of what its fit has not seen: records held out, parts left out in turn
 
-Also here: refit (starts of fits), missing_signal (the signal that a model lacks at each port).
+Also here: missing_signal (the signal that a model lacks at each port).
 """
 
 from armid.inference.infer import Inference, infer, prepared

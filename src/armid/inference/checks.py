@@ -20,7 +20,7 @@ from armid.inference.whitening import WhitenedData, WhiteRecords, whitened
 from armid.model import Array, Model
 from armid.problem.problem import Replay
 from armid.record import Record
-from armid.record.noise import memory_of
+from armid.record.sensor import memory_of
 
 LAGS, N_BINS = 40, 12
 BANDS_HZ = (0.0, 5.0, 12.0, 25.0, 50.0, 100.0, 250.0, np.inf)

@@ -13,7 +13,7 @@ from armid.engine import along
 from armid.errors import ArmidError, nearest
 from armid.estimation.constants import NAMED
 from armid.estimation.information import NORMAL_95
-from armid.estimation.least_squares import Estimates, held_by_bound, spread_starts, with_fitted_starts
+from armid.estimation.least_squares import Estimates, descend, held_by_bound, spread_starts, with_fitted_starts
 from armid.estimation.noise_model import levels_left
 from armid.inference.candidates import constant_effects
 from armid.inference.carry_over import predicting_best
@@ -23,12 +23,11 @@ from armid.inference.evidence import Expansion, expansion_of
 from armid.inference.hypothesis import Hypotheses, Hypothesis
 from armid.inference.kinds import effects
 from armid.inference.library import Library, library_of
-from armid.inference.model import Fit, fit_from
+from armid.inference.model import ROUGHLY, Fit, accurate, fit_from
 from armid.inference.posterior import CONSTANTS, Posterior, posterior, spread
-from armid.inference.refit import accurate
 from armid.inference.search import Exploration, explore, without_denied
-from armid.inference.whitening import whitened
-from armid.model import EFFECTS, Effect, Model
+from armid.inference.whitening import WhiteRecords, whitened
+from armid.model import EFFECTS, Array, Effect, Model
 from armid.model.effects.sensor import sensor_effects
 from armid.problem.space import Space
 from armid.record import Campaign
@@ -39,6 +38,8 @@ REACH = 16.0
 ALIKE = 2.0
 # How much wider a range becomes whose end holds a strength, and how often.
 WIDER, MOST_WIDENED = 8.0, 4
+# Shares of each record to which a first estimate is carried on.
+GROWING = (0.125, 0.25, 0.5, 0.75)
 # Names in the sentence that leads, and constants that are named as a cause of an interval's width.
 MOST_TOLD, MOST_CONSTANTS = 5, 3
 
@@ -282,10 +283,23 @@ def infer(library: Library, declared: Fit) -> Inference:
 
 
 def declared_fit(library: Library) -> Fit:
-    """Return the declared model at its estimate, from starts that are spread over the box."""
+    """Return the declared model at its estimate, from starts over the box and one that grew with the records."""
     problem = library.problem(())
-    starts = spread_starts(problem) if problem.space.free.any() else ()
+    starts = [*spread_starts(problem), grown_start(problem)] if problem.space.free.any() else ()
     return accurate(fit_from(problem, (), starts), library)
+
+
+def grown_start(problem: WhiteRecords) -> Array:
+    """Return the estimate of the begin of each record, carried on to ever longer parts, as shares of the range.
+
+    A motion that may go over the top has many minima when it is simulated for long, and few at its begin.
+    """
+    z: Array | None = None
+    for share in GROWING:
+        part = problem.begin(share)
+        z = descend(part, spread_starts(part) if z is None else [z], ROUGHLY)
+    assert z is not None
+    return z
 
 
 def with_scales(library: Library) -> tuple[Library, Fit]:

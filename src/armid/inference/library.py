@@ -18,17 +18,7 @@ import numpy as np
 from armid.engine import STANDARD, Calibration, Schedule, Simulation, probes, simulate
 from armid.engine.calibrate import ALLOWED, MARGIN, difference, switch_weights
 from armid.estimation.least_squares import side_by_side
-from armid.inference.candidates import (
-    PROBE,
-    Active,
-    EffectKey,
-    bump_at,
-    bundled,
-    compiled,
-    declared_keys,
-    idle,
-    joined,
-)
+from armid.inference.candidates import PROBE, Active, EffectKey, bump_at, bundled, compiled, declared_keys, idle, joined
 from armid.inference.whitening import WhitenedData, WhiteRecords
 from armid.model import EFFECTS, Array, Effect, Manoeuvre, Model, Parameter, distinct
 from armid.model.parameter import powers_of

@@ -13,8 +13,7 @@ from armid.estimation.least_squares import WeightedRecords
 from armid.inference.candidates import PROBE, idle
 from armid.inference.checks import variable_names
 from armid.inference.library import Library
-from armid.inference.model import Fit, beyond
-from armid.inference.refit import candidate_at, free_values
+from armid.inference.model import Fit, beyond, candidate_at, free_values
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array, Model
 from armid.problem.problem import Replay, by_record, with_each

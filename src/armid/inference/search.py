@@ -26,11 +26,10 @@ from armid.inference.evidence import (
     scale_of,
 )
 from armid.inference.hypothesis import Hypotheses, Hypothesis, Proposal, log_prior, words
-from armid.inference.kinds import drifts, effects, records, unknown
+from armid.inference.kinds import drifts, effects, faults, unknown
 from armid.inference.library import Library
-from armid.inference.model import Fit, fit_from
-from armid.inference.refit import finished, start_of, unless_diverged, with_free_shapes
-from armid.inference.refit import freed as freed_shape
+from armid.inference.model import Fit, finished, fit_from, start_of, unless_diverged, with_free_shapes
+from armid.inference.model import freed as freed_shape
 from armid.inference.unknowns import Unknown, constants_of, freed, polished, projected
 from armid.model import Array
 
@@ -138,7 +137,7 @@ def explore(library: Library, declared: Fit, most: int | None = None) -> Explora
     most = most or int(np.clip(MOST_EXPANDED / cost, FEWEST_EXPANDED, MOST_EXPANDED))
     exploration.fits[frozenset()] = declared
     exploration.fits[frozenset()] = with_constants(declared, exploration.constants, exploration.scale().weight)
-    exploration.faults = records.hypotheses(declared.records)
+    exploration.faults = faults.hypotheses(declared.records)
     exploration.drifts = drifts.hypotheses(declared, library)
     in_vain = 0
     while len(exploration.forecasts) < most and in_vain < MOST_IN_VAIN:
@@ -240,11 +239,11 @@ def expand(exploration: Exploration, model: Hypotheses) -> None:
     """Fit the most promising changes of a model: additions of every kind, pairs, swaps, drops, free shapes."""
     fit, library, scale = exploration.fits[model], exploration.library, exploration.scale()
     library = library.about(fit.records.replays, fit.misfit) if fit.base is None else library
-    library.say(f"expanding {words(model)}")
+    library.say(f"expanding {words(model) if model else 'the declared model'}")
     about, held = expansion_of(fit, scale, library), expansion_of(fit, scale, library, with_doubts=False)
     proposals: list[Proposal] = effects.propose(fit, exploration.known, library)
     names = {h.public for h in model}
-    others = [*records.propose(fit, exploration.faults, library), *drifts.propose(fit, exploration.drifts)]
+    others = [*faults.propose(fit, exploration.faults, library), *drifts.propose(fit, exploration.drifts)]
     others = [p for p in others if p.hypothesis.public not in names]
     ahead = [forecast(about, p) for p in proposals]
     ahead_held = [forecast(held, p) for p in proposals]

@@ -17,7 +17,7 @@ from armid.estimation.noise_model import MISFIT, NoiseModel, noise_levels, senso
 from armid.model import Array, Plant
 from armid.problem.problem import signals_of
 from armid.record import Record
-from armid.record.noise import correlation_sum, new_share
+from armid.record.sensor import correlation_sum, new_share
 
 # Sum of squares, in units of the noise, from which on a signal is kept: the samples do not see smaller ones.
 SMALLEST = 0.1
@@ -223,6 +223,11 @@ class WhiteRecords(LeastSquaresProblem):
     def whole_signals(self, candidates: Array, shares: Mapping[str, Array] | None = None) -> Array:
         """Return whitened signals of whole candidates, (n_candidates, n_samples); shares: see `ReadyRecord.runs`."""
         return self.data.white(signals_of(self.replays, candidates, shares))
+
+    def begin(self, share: float) -> "WhiteRecords":
+        """Return the problem of a share of each piece of the records, from its first sample on."""
+        counts = [np.arange(n) < share * n for lengths in self.data.lengths for n in lengths]
+        return replace(self, data=replace(self.data, sound=self.data.sound * np.concatenate(counts)))
 
     def padded(self, columns: Array) -> Array:
         """Return columns of the samples, (n_samples, n), with zeros in the rows of known parameters."""

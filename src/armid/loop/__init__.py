@@ -2,12 +2,9 @@
 
 What is missing is inferred in `armid.inference`. Here, in reading order:
 
-close_loop       the model in force, the judgement on records held out, the verdict
-advice           the record to make next
-record_faults    records that differ
-common_factors   which parameters the records give only together
-result           report.json
-document         what is shown; `figures`: what is drawn
+close_loop   the model in force, the judgement on records held out, the verdict, the record to make next
+result       records that differ, report.json
+document     what is shown; `figures`: what is drawn
 
 `Judgement`  one model, and what it leaves on train and held-out records
 `Step`       one effect that was added

@@ -1,4 +1,4 @@
-"""Close the loop: residual, missing effect, extended model, error before and after."""
+"""Close the loop: residual, missing effect, extended model, error before and after, the record to make next."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -8,24 +8,24 @@ from pathlib import Path
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from armid.estimation.constants import moved_record
+from armid.estimation.advice import Advice, Rival, advise
+from armid.estimation.constants import STEP, common_factors, moved_record
 from armid.estimation.corrections import DataIssue
 from armid.estimation.data_checks import AS_GOOD, data_issues, given_twice
+from armid.estimation.design import manoeuvre_grid
 from armid.estimation.identify import JointErrors, campaign_errors
 from armid.estimation.least_squares import held_by_bound
+from armid.inference.candidates import ERROR_OF
 from armid.inference.carry_over import missed_sentences, over_noise
 from armid.inference.checks import holdout_residuals, is_significant, train_residuals
-from armid.inference.decisions import CLAIMED, DENIED, MENTIONED, OVER_NOISE, WITHIN
-from armid.inference.hypothesis import Hypotheses, Hypothesis
+from armid.inference.decisions import CLAIMED, DENIED, MENTIONED, OVER_NOISE, WINDOW, WITHIN
+from armid.inference.hypothesis import Hypotheses, Hypothesis, words
 from armid.inference.infer import Inference, infer, prepared
 from armid.inference.library import Library, calibrated_replays
 from armid.inference.missing_signal import Missing, missing_from
-from armid.inference.model import Fit, with_standard_accuracy
-from armid.inference.refit import unless_diverged
+from armid.inference.model import Fit, beyond, candidate_at, decomposed, unless_diverged, with_standard_accuracy
 from armid.inference.search import without
-from armid.loop.advice import advice_on
-from armid.loop.common_factors import known_together
-from armid.loop.record_faults import broken_records, record_faults_of
+from armid.inference.whitening import WhiteRecords
 from armid.loop.result import (
     CARRIES_NOT,
     DISAGREES,
@@ -40,9 +40,12 @@ from armid.loop.result import (
     Judgement,
     Step,
     Withdrawn,
+    broken_records,
     estimates,
+    record_faults_of,
 )
-from armid.model import Effect, Model
+from armid.model import Array, Effect, Model
+from armid.problem.problem import with_each
 from armid.record import Campaign, Record
 
 # Mistakes of the data checks that leave nothing to search for, and what it tells whatever the loop finds.
@@ -282,3 +285,84 @@ def errors_on(records: tuple[Record, ...], judged: Judgement, library: Library) 
     fit = judged.fit
     moved = [moved_record(r, library.declared.plant, fit.constants) for r in records]
     return campaign_errors(calibrated_replays(moved, fit.model, fit.records.space, fit.values), fit.candidate)
+
+
+# Manoeuvres that are listed, and models that one has to tell apart.
+MOST_ADVICE, MOST_RIVALS = 5, 3
+
+
+def advice_on(
+    inference: Inference, speed_limit: float | None, threads: int, say: Callable[[str], None]
+) -> tuple[Advice, ...]:  # fmt: skip
+    """Return the manoeuvres that would tell the most probable models apart, best first; none where one stands alone."""
+    rivals = rivals_of(inference)
+    if len(rivals) < 2:
+        return ()
+    say(f"looking for a manoeuvre that tells {' and '.join(r.name for r in rivals)} apart")
+    best = inference.exploration.fits[inference.in_force]
+    replays, levels = best.records.replays, best.records.data.levels
+    # of each output the first level, in the order in which `Motions.signals` gives them
+    known = dict(sorted(((r.place, level) for r, level in reversed([*zip(replays, levels, strict=True)])),
+                        key=lambda pair: pair[0]))  # fmt: skip
+
+    def white(signals: Array) -> Array:
+        pairs = zip(known.values(), signals, strict=True)
+        weight = float(np.sqrt(rivals[0].trust))
+        return weight * np.concatenate([level.white(y, [y.shape[-1]]) for level, y in pairs], axis=-1)
+
+    library = inference.exploration.library
+    grid = manoeuvre_grid(best.model, library.data.records)
+    return advise(rivals, white, grid, speed_limit, threads=threads)[:MOST_ADVICE]
+
+
+def rivals_of(inference: Inference) -> list[Rival]:
+    """Return the most probable models without faults of records whose effects differ, one for each set of names."""
+    ranked = [(m, p) for m, p in inference.exploration.ranked() if all(h.kind == "effect" for h in m)]
+    rivals: dict[str, Rival] = {}
+    for model, p in ranked:
+        name = words(model)
+        if ranked[0][1] - p > WINDOW or len(rivals) == MOST_RIVALS:
+            break
+        fit = inference.exploration.fits[model]
+        # What a sample counts, and one of a record like these will: less than 1 where more than noise is left.
+        trust = float(np.mean(fit.records.data.trust(fit.residual)))
+        rivals.setdefault(name, Rival(name, fit.records, fit.z, -2.0 * p, trust, fit.constants))
+    return list(rivals.values())
+
+
+def known_together(fit: Fit, library: Library) -> tuple[str, ...]:
+    """Return in words which parameters of the declared model and constants the records give only together.
+
+    What the free strengths of effects make up for counts as unseen. An effect that a parameter is already comes last.
+    """
+    doubles = [f"{key.public} would do what {name} does already, and was not looked for"
+               for key, name in library.doubles.items()]  # fmt: skip
+    own, strengths = {}, [np.zeros(len(fit.residual))]
+    for name, value in fit.values.items():
+        owner = library.owner(name)
+        if owner is None:
+            own[name] = slope(fit, fit.records, name, value)
+        elif owner.name.startswith(ERROR_OF):
+            own[owner.name.removeprefix(ERROR_OF)] = slope(fit, fit.records, name, 1.0 + value)
+        else:
+            strengths.append(slope(fit, fit.records, name, value))
+    pieces = {r.record.file: r.pieces for r in fit.records.replays}
+    for key in library.candidates:
+        if key.name.startswith(ERROR_OF) and key not in fit.active:
+            records = library.problem((*fit.active, key), fit.values)
+            there = replace(records, replays=with_each(records.replays, lambda r: replace(
+                r, record=replace(r.record, pieces=pieces[r.record.file]))))  # fmt: skip
+            own[key.name.removeprefix(ERROR_OF)] = slope(fit, there, f"{key.compiled}.error", 1.0)
+    if not own:
+        return tuple(doubles)
+    basis, _ = decomposed(np.column_stack(strengths))
+    products = [replace(p, slope=beyond(basis, p.slope)) for p in fit.products(library.tolerances)]
+    return (*common_factors(tuple(own), beyond(basis, np.column_stack([*own.values()])), products), *doubles)
+
+
+def slope(fit: Fit, records: WhiteRecords, name: str, size: float) -> Array:
+    """Return the change of the whitened signal by a parameter, its size taken as 1, about a fit, (n_samples,)."""
+    both = np.tile(candidate_at(records, fit.values), (2, 1))
+    both[:, records.space.index(name)] += np.array([STEP, -STEP]) * size
+    upper, lower = replace(records, data=fit.records.data).whole_signals(both)
+    return np.asarray((upper - lower) / (2.0 * STEP))

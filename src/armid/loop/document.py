@@ -16,7 +16,6 @@ from armid.inference.hypothesis import words
 from armid.inference.infer import Inference, sentence_of
 from armid.inference.missing_signal import Missing
 from armid.loop.figures import figures_of, record_figure
-from armid.loop.record_faults import fault_sentence
 from armid.loop.result import (
     CARRIES_NOT,
     DISAGREES,
@@ -29,6 +28,7 @@ from armid.loop.result import (
     VERSION,
     ClosedLoop,
     Judgement,
+    fault_sentence,
     record_entries,
     report_of,
 )
@@ -58,7 +58,7 @@ from armid.report.document import (
     value_text,
 )
 from armid.report.result import Parts
-from armid.units import shown
+from armid.units import scale_of, shown
 
 TIMES = {"1": "", "direction": ", times the direction of motion,", "drive_effort": ", times the effort of the drive,"}
 # A shift of a parameter by more than this share of its value, and of its interval, is listed.
@@ -261,8 +261,8 @@ def trust_text(p: Mapping[str, Any]) -> str:
 def noise_text(p: Mapping[str, Any]) -> str:
     if p["noise_low"] is None or p["noise_high"] is None:
         return ""
-    low, high = (shown(p[end], p["unit"])[0] for end in ("noise_low", "noise_high"))
-    return f"{low:.5g} to {high:.5g}"
+    factor = scale_of(p["unit"], p["value"])[1]
+    return f"{factor * p['noise_low']:.5g} to {factor * p['noise_high']:.5g}"
 
 
 def residual_section(details: Mapping[str, Any], errors: Table) -> Section:

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from armid.engine.cache import kept
+from armid.engine.compile import kept
 from armid.errors import ArmidError
 from armid.model import Array
 

@@ -18,8 +18,8 @@ from armid.model import Array
 from armid.problem.problem import ReadyRecord, Replay, by_record, with_each
 from armid.problem.space import Space
 from armid.record import Piece
-from armid.record.noise import correlation_sum
 from armid.record.record import Samples, StartCorrection
+from armid.record.sensor import correlation_sum
 
 # Step of the differences, as a share of the plant's speed scale; a speed held for a second is the size of a position.
 MOVE = 1e-4

@@ -7,18 +7,17 @@ reader    one [[records]] entry and its table -> Record
 table     CSV files of numbers or tables of pandas, and what their headers mean
 resample  even time grids out of the times of a file; which samples count
 start     the state from which a record or a piece of it is simulated
-noise     the noise of a sensor, from rest or from the motion itself
 dialect   CSV files with other separators, decimals, comments, units, encodings
-sensor    step and hold of a sensor, from the values as they were read
+sensor    what a sensor does: step, hold, noise; samples that are no data: clipped, repeated, wild ones
 signal    one measured column: which rows are data, its noise, its turns
-broken    samples that are no data: clipped and repeated ones, wild ones
-record    Record (one file), its Signals, its Pieces, Noise, Irregularity: what all of that is put into
+record    Record (one file), its Signals, its Pieces, Irregularity: what all of that is put into
 """
 
 from armid.record.campaign import Campaign, read_campaign, write_campaign
-from armid.record.record import Irregularity, Noise, Piece, Record, RecordWarning, Signal
+from armid.record.record import Irregularity, Piece, Record, RecordWarning, Signal
 from armid.record.resample import IrregularSamplingWarning
 from armid.record.schema import Override
+from armid.record.sensor import Noise
 from armid.record.table import write_table
 
 __all__ = [

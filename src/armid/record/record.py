@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.model import Array, Manoeuvre, Output
-from armid.record.broken import Broken
-from armid.record.sensor import Mask, Sensor
+from armid.record.sensor import Broken, Mask, Noise, Sensor
 
 NOISE_FREE = 1e-6
 # Source of a noise that nothing has to be learnt from.
@@ -21,24 +20,6 @@ Samples = slice | NDArray[np.intp]
 
 class RecordWarning(UserWarning):
     """Say what had to be assumed to read a record, or what of it is not data."""
-
-
-@dataclass(frozen=True)
-class Noise:
-    """What is known of a sensor's noise.
-
-    rms: [unit of the output], about the mean. mean: not subtracted anywhere; None where no rest was recorded.
-    correlation_time_s: of the exponential correlation with the same sum; 0 for white noise. effective_fraction:
-    independent samples per sample, 1/(1 + 2 sum rho_k), in (0, 1]. source: "rest" (the arm under its brake) or
-    "differences" (high differences of the motion, which cannot tell a correlation: the noise is taken for white).
-    """
-
-    rms: float
-    mean: float | None
-    correlation_time_s: float
-    effective_fraction: float
-    n_samples: int
-    source: str
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,9 @@
-"""The sensor of an output, found from its values as they were read: its step and how long it holds a value."""
+"""What a sensor does: its step, how long it holds a value, its noise, and samples that are no data."""
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from math import comb, log1p
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +27,24 @@ MOST_RENEWALS = 3.5
 ON_TIME, QUARTER = 0.9, 0.25
 # ... and at least this share of the changes differs from a single step onward: a slow motion makes such steps.
 UNLIKE_SLOW_MOTION = 0.2
+
+
+@dataclass(frozen=True)
+class Noise:
+    """What is known of a sensor's noise.
+
+    rms: [unit of the output], about the mean. mean: not subtracted anywhere; None where no rest was recorded.
+    correlation_time_s: of the exponential correlation with the same sum; 0 for white noise. effective_fraction:
+    independent samples per sample, 1/(1 + 2 sum rho_k), in (0, 1]. source: "rest" (the arm under its brake) or
+    "differences" (high differences of the motion, which cannot tell a correlation: the noise is taken for white).
+    """
+
+    rms: float
+    mean: float | None
+    correlation_time_s: float
+    effective_fraction: float
+    n_samples: int
+    source: str
 
 
 @dataclass(frozen=True)
@@ -102,3 +123,331 @@ def renewed(values: Array, hold: int) -> Mask:
     left = np.repeat(np.diff(np.append(begins, values.size)), np.diff(np.append(begins, values.size))) - since
     # the last renewal of a run that is as old as half a hold when the run ends was none
     return np.asarray(changed | ((since % hold == 0) & (2 * left > hold)))
+
+
+FEWEST_REST_SAMPLES = 50
+# At rest a sensor whose noise is below this share of its step shows more or less of it, as the step falls. Where the
+# motion holds more noise, and more than a share of its largest value, the motion tells it.
+HIDDEN, SHOWN_IN_MOTION = 0.6, 1e-4
+# A rest between motions: a speed is this small against its largest value, and mean and size of the values move by so
+# many of their standard errors at most from one half to the other. Of a longer pause the later parts are tried, as a
+# machine runs down.
+AT_REST, STANDS, HALVINGS = 0.01, 3.0, 3
+ORDERS = range(3, 9)
+# Multiples of it fill a step evenly.
+GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+# Neighbours may correlate as the noise of a filtered sensor does: up to the longest memory, from so many standard
+# errors (about 2/sqrt(n)) on.
+MEMORIES, DISTINCT, LONGEST_MEMORY = np.linspace(-0.5, 0.95, 146), 3.0, 0.8
+# Independent samples of a rest that tell its noise.
+FEWEST_INDEPENDENT = 12.0
+# Values farther out than this many standard deviations are no noise.
+OUTLYING = 4.0
+
+
+def noise_of(rest: Array, motion: Array, interval: float, times: Array | None = None) -> Noise:
+    """Return the noise of a record.
+
+    rest: samples at rest; with fewer than 50 of them, or where the sensor's step hides their noise, the differences of
+    `motion` are used. times: of the motion [s] where they are irregular. The noise is at least that of the sensor's
+    step, step/sqrt(12), of a fine one that of the rounding of its largest value, so that it is never 0.
+    """
+    size, step = float(np.max(np.abs(motion), initial=0.0)), step_of(motion)
+    floor = max(step, float(np.spacing(size))) / np.sqrt(12.0)
+    is_short = rest.size < FEWEST_REST_SAMPLES
+    is_equal = is_short or np.ptp(rest) == 0.0
+    if is_equal or np.std(rest) < HIDDEN * step:
+        apart = difference_rms(motion, times)
+        # of a slow motion the steps alone look like up to twice their noise
+        if is_short or apart > max((1.0 + is_equal) * floor, SHOWN_IN_MOTION * size):
+            return Noise(max(apart, floor), None, 0.0, 1.0, motion.size, "differences")
+    mean = float(np.mean(rest))
+    # of equal values the mean can miss the value by its last digit, which would look like correlated noise
+    deviations = rest - mean if np.ptp(rest) > 0 else np.zeros_like(rest)
+    rms = float(np.sqrt(np.mean(deviations**2)))
+    total = correlation_sum(deviations)
+    # an exponential correlation rho_k = phi^k sums to phi/(1 - phi) = total, and phi = exp(-interval/time constant)
+    time_constant = interval / log1p(1 / total) if total > 0 else 0.0
+    return Noise(max(rms, floor), mean, time_constant, 1 / (1 + 2 * total), rest.size, "rest")
+
+
+def rest_between(values: Array, still: Mask, is_speed: bool) -> Array:
+    """Return the longest rest between motions, empty without one of 50 samples.
+
+    A stick of friction under drive is not a rest: the inputs are still, too. values: (n_rows,). still: where no input
+    changes, (n_rows,). is_speed: whether a value of 0 tells a standstill, else any that stays does.
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8)))
+    longest = np.empty(0)
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        for part in range(HALVINGS):
+            rest = values[end - (end - begin) // 2**part : end]
+            if rest.size < max(FEWEST_REST_SAMPLES, longest.size + 1):
+                break
+            if stands_still(rest, float(np.max(np.abs(values))), is_speed):
+                longest = rest
+    return longest
+
+
+def stands_still(rest: Array, size: float, is_speed: bool) -> bool:
+    """Tell whether values are noise about a mean: neither this nor their size moves, and they soon forget.
+
+    The independent samples are those of a variance, n / (1 + 2 sum rho_k^2) (Bartlett 1946): a machine that swings
+    freely goes on correlating with itself.
+    """
+    if is_speed and abs(float(np.mean(rest))) > AT_REST * size:
+        return False
+    deviations = rest - np.mean(rest)
+    independent = rest.size / (1.0 + 2.0 * float(np.sum(autocorrelation(deviations) ** 2)))
+    error = 2.0 * float(np.std(rest)) * np.sqrt((1.0 + 2.0 * correlation_sum(deviations)) / rest.size)
+    first, second = rest[: rest.size // 2], rest[rest.size // 2 :]
+    drifts = abs(float(np.mean(first) - np.mean(second))) > STANDS * error
+    sizes = np.maximum([np.std(first), np.std(second)], np.finfo(np.float64).tiny)
+    log_ratio = 2.0 * abs(float(np.log(sizes[0] / sizes[1])))
+    return not drifts and independent >= FEWEST_INDEPENDENT and log_ratio <= STANDS * np.sqrt(8.0 / independent)
+
+
+def autocorrelation(deviations: Array) -> Array:
+    """Return the autocorrelation at positive lags up to half of the values, 0 where all are equal."""
+    n = deviations.size
+    power = np.abs(np.fft.rfft(deviations, 2 * n)) ** 2
+    covariance = np.fft.irfft(power)[: max(n // 2, 1)]
+    return np.asarray(covariance[1:] / covariance[0] if covariance[0] > 0 else np.zeros(len(covariance) - 1))
+
+
+def correlation_sum(deviations: Array) -> float:
+    """Return the sum of the autocorrelation over positive lags, at least 0.
+
+    It ends before the first lag whose correlation is below 2/sqrt(n), what white noise shows by chance.
+    """
+    correlation = autocorrelation(deviations)
+    small = np.flatnonzero(correlation < 2 / np.sqrt(deviations.size))
+    return float(np.sum(correlation[: small[0] if small.size else None]))
+
+
+def memory_of(parts: Sequence[Array]) -> float:
+    """Return the correlation of neighbouring samples of the noise in residuals, 0 where none is seen or it is too long.
+
+    From second differences, which leave next to nothing of what a model lacks: their correlation tells that of an
+    exponential one, rho^k at lag k. Long memory looks like a slow change.
+    """
+    differences = [np.diff(p, n=2) for p in parts]
+    size = OUTLYING * 1.4826 * float(np.median(np.abs(np.concatenate(differences))))
+    kept = [np.clip(d, -size, size) for d in differences]
+    total, n = sum(float(d @ d) for d in kept), sum(len(d) for d in kept)
+    if not total > 0.0:
+        return 0.0
+    # covariances of second differences of rho^|k|, at lags 0 and 1
+    lags = [6.0 - 8.0 * MEMORIES + 2.0 * MEMORIES**2, -4.0 + 7.0 * MEMORIES - 4.0 * MEMORIES**2 + MEMORIES**3]
+    seen = sum(float(d[1:] @ d[:-1]) for d in kept) / total
+    rho = float(np.interp(seen, lags[1] / lags[0], MEMORIES))
+    return rho if 2.0 * DISTINCT / np.sqrt(n) < rho <= LONGEST_MEMORY else 0.0
+
+
+def new_share(residual: Array) -> float:
+    """Return the share of samples that count as independent in a residual with the memory of `memory_of`."""
+    memory = memory_of([residual])
+    return (1.0 - memory) / (1.0 + memory)
+
+
+def difference_rms(motion: Array, times: Array | None = None) -> float:
+    """Return the rms of the noise in a motion [unit], from its differences of high order; the noise is taken as white.
+
+    The k-th difference of white noise has the variance C(2k, k) sigma^2. The third is taken, which removes slow motion;
+    where the next order gives less than a tenth of it, the motion was still in it (low-passed noise falls less fast)
+    and the next is taken. The median of the absolute values keeps the transients of the motion out; differences of a
+    coarse sensor are spread over its step, as else that median is one of a few values.
+    Runs of equal samples are left out where the noise of the others is more than a step of the values: a sensor that
+    is stuck tells nothing of its noise.
+    times: [s], (n_rows,), where they are irregular; then divided differences take the place of plain ones.
+    """
+    moved = changing(motion)
+    if FEWEST_REST_SAMPLES <= moved.sum() < motion.size:
+        apart = difference_rms(motion[moved], None if times is None else times[moved])
+        if apart > step_of(motion):
+            return apart
+    estimates = []
+    for order in ORDERS:
+        if times is None:
+            spread = step_of(motion) * ((GOLDEN * np.arange(motion.size - order)) % 1.0 - 0.5)
+            differences = (np.diff(motion, n=order) + spread) / np.sqrt(comb(2 * order, order))
+        else:
+            differences = divided_differences(motion, times, order)
+        estimates.append(1.4826 * float(np.median(np.abs(differences))))
+        if len(estimates) > 1 and estimates[-1] > 0.1 * estimates[-2]:
+            return float(estimates[-2])
+    return float(estimates[-1])
+
+
+def changing(motion: Array) -> Mask:
+    """Return which samples stand in no run of equal ones, (n_samples,)."""
+    return ~in_runs(np.append(np.diff(motion) == 0.0, False), REPEATED - 1)
+
+
+def divided_differences(values: Array, times: Array, order: int) -> Array:
+    """Return what each order + 1 neighbours at irregular times hold beyond a polynomial of degree order - 1.
+
+    sum_j c_j x_j with c_j = 1 / prod_i (t_j - t_i) and sum c_j^2 = 1, so that white noise keeps its rms.
+    values, times [s]: shape (n,); returns (n - order,).
+    """
+    n, unit = values.size - order, float(np.median(np.diff(times)))
+    total, squares = np.zeros(n), np.zeros(n)
+    for j in range(order + 1):
+        weight = np.ones(n)
+        for i in range(order + 1):
+            if i != j:
+                weight *= unit / (times[j : j + n] - times[i : i + n])
+        total += weight * values[j : j + n]
+        squares += weight**2
+    return total / np.sqrt(squares)
+
+
+# So many equal values in a row are no chance where the noise exceeds half a step of the sensor.
+REPEATED = 8
+# Chance of one longer run of equal values in a record of a sound sensor; a larger one loses samples of an encoder.
+CHANCE = 0.001
+# A sample that is so many times the noise away from the median of its four neighbours, this many times what nearly all
+# samples of the record are, and so many times what the closest three of the neighbours span: a step spans them.
+ABOVE_NOISE, ABOVE_OTHERS, USUAL, ABOVE_SPAN = 10.0, 6.0, 0.95, 3.0
+# Of the first and last samples, which have neighbours on one side, so much of the range of the signal as well: filters
+# leave small errors there.
+AT_ENDS = 0.1
+# An input that changes in one sample by so many times what it usually does, and by so much of its range, makes a signal
+# jump too (a current, say); so many samples from there on are no wild ones.
+SUDDEN, SUDDEN_SHARE, AFTER_SUDDEN = 6.0, 0.05, 4
+# A sensor that froze is left behind by so many times what nearly all samples change.
+LEAP = 2.0
+# A signal that runs into the limit of its sensor gets there at no less than this share of its usual rate, over so many
+# samples, and leaves it so: a machine that ends at rest or at an even speed slows down before.
+ABRUPT, RUN_UP = 0.2, 4
+
+
+@dataclass(frozen=True)
+class Broken:
+    """Samples of one kind: "gap", "clipped", "stuck" or "spikes".
+
+    count: of the rows of the file, or of the grid samples in a gap; from_s, to_s: first and last [s]; line: of the file
+    on which the first stands, 0 for a gap.
+    """
+
+    kind: str
+    count: int
+    from_s: float
+    to_s: float
+    line: int = 0
+
+
+def repeated_samples(values: Array, noise: float, known: bool, sensor: Sensor, sudden: Mask) -> dict[str, Mask]:
+    """Return which values are at the limit of the sensor, and which a frozen one repeats, kind -> (n_rows,).
+
+    Equal values are natural for a sensor whose step hides its noise. A rest shows whether it does; where none was
+    recorded, motion may pass for noise, and friction or an even speed for a fault. Then values at a limit are those
+    that are reached abruptly, and values of a frozen sensor those that are left by a leap.
+    values: those that are new, (n_rows,). noise: rms [their unit]; known: from a rest. sudden: where an input has just
+    jumped, (n_rows,).
+    """
+    clipped, stuck = np.zeros((2, values.size), dtype=np.bool_)
+    if noise <= 0.5 * sensor.step or values.size <= RUN_UP:
+        return {"clipped": clipped, "stuck": stuck}
+    usual = float(np.sqrt(np.mean((values[RUN_UP:] - values[:-RUN_UP]) ** 2)))
+    leap = max(ABOVE_NOISE * noise, LEAP * float(np.quantile(np.abs(np.diff(values)), USUAL)))
+    repeated = runs(values)
+    for limit in (float(values.max()), float(values.min())):
+        stretches = visits(values, limit) if abs(limit) > sensor.step else []
+        longest = max((end - begin for begin, end in repeated if values[begin] == limit), default=0)
+        # noise leaves a limit for some samples where the signal reaches it; a frozen sensor has one run
+        in_noise = known and int(np.sum(values == limit)) > longest
+        if longest and any(in_noise or is_abrupt(values, *stretch, ABRUPT * usual) for stretch in stretches):
+            clipped |= values == limit
+    by_chance = longest_by_chance(noise, sensor.step, values.size)
+    for begin, end in repeated:
+        if end - begin <= by_chance:
+            continue
+        last = min(end, values.size - 1)
+        away = abs(float(values[last] - values[begin]))
+        left_behind = known or (away > leap and not sudden[last])
+        # many sensors show a standstill without noise, and a machine may start at once
+        stuck[begin:end] = abs(values[begin]) > sensor.step and left_behind
+    return {"clipped": clipped, "stuck": stuck & ~clipped}
+
+
+def longest_by_chance(noise: float, step: float, n: int) -> float:
+    """Return the longest run of equal values that noise leaves within one step of the sensor among n values.
+
+    p^(r - 1) n = CHANCE, p = erf(step / (2 sqrt(2) sigma)) the chance that a value at the middle of a step stays in it,
+    sigma^2 = noise^2 - step^2/12 the noise before it is rounded. noise: rms with the rounding.
+    """
+    sigma = math.sqrt(max(noise**2 - step**2 / 12.0, 0.0))
+    stays = math.erf(0.5 * step / (math.sqrt(2.0) * sigma)) if sigma > 0.0 else 1.0
+    if stays in (0.0, 1.0):
+        return math.inf if stays else 1.0
+    return 1.0 + math.log(CHANCE / n) / math.log(stays)
+
+
+def visits(values: Array, limit: float) -> list[tuple[int, int]]:
+    """Return first row and end of the stretches at a limit; noise may leave it for some samples near the ends."""
+    at = np.flatnonzero(values == limit)
+    parts = np.split(at, np.flatnonzero(np.diff(at) > RUN_UP) + 1)
+    return [(int(part[0]), int(part[-1]) + 1) for part in parts if part.size >= REPEATED]
+
+
+def is_abrupt(values: Array, begin: int, end: int, least: float) -> bool:
+    """Tell whether a signal reaches and leaves a stretch of equal values by so much within a few samples."""
+    sides = (values[max(begin - RUN_UP, 0) : begin], values[end : end + RUN_UP])
+    away = [float(np.mean(np.abs(side - values[begin]))) for side in sides if side.size == RUN_UP]
+    return bool(away) and min(away) >= least
+
+
+def runs(values: Array) -> list[tuple[int, int]]:
+    """Return first row and end of the runs of equal values that are too long for a chance."""
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0.0) + 1, [values.size]])
+    long = np.flatnonzero(np.diff(edges) >= REPEATED)
+    return list(zip(edges[long].tolist(), edges[long + 1].tolist(), strict=True))
+
+
+def wild_samples(values: Array, noise: float) -> Mask:
+    """Return the samples that their neighbours on both sides do not explain, (n_rows,).
+
+    Of the first and last samples the neighbours are the straight lines through those next to them.
+    """
+    if values.size < 2 * RUN_UP:
+        return np.zeros(values.size, dtype=np.bool_)
+    sides = np.sort(neighbours(values), axis=0)
+    away = np.abs(values - 0.5 * (sides[1] + sides[2]))
+    span = np.minimum(sides[2] - sides[0], sides[3] - sides[1])
+    usual = np.full(values.size, max(ABOVE_NOISE * noise, ABOVE_OTHERS * float(np.quantile(away, USUAL))))
+    ends = [0, 1, -2, -1]
+    usual[ends] = np.maximum(usual[ends], AT_ENDS * float(np.ptp(np.quantile(values, [1.0 - USUAL, USUAL]))))
+    return np.asarray(away > np.maximum(usual, ABOVE_SPAN * span))
+
+
+def neighbours(values: Array) -> Array:
+    """Return two values on either side of each, (4, n_rows)."""
+    padded = np.pad(values, 2, mode="reflect", reflect_type="odd")
+    sides = np.stack([padded[i : i + values.size] for i in (0, 1, 3, 4)])
+    x = values
+    for at, (a, b, c, d) in ((0, (1, 2, 3, 4)), (-1, (-2, -3, -4, -5))):
+        sides[:, at] = 2 * x[a] - x[b], 1.5 * x[a] - 0.5 * x[c], 2 * x[b] - x[d], 3 * x[a] - 3 * x[b] + x[c]
+    for at, (end, a, b, c) in ((1, (0, 2, 3, 4)), (-2, (-1, -3, -4, -5))):
+        sides[:, at] = x[end], x[a], 2 * x[a] - x[b], 1.5 * x[a] - 0.5 * x[c]
+    return sides
+
+
+def after_sudden(values: Array) -> Mask:
+    """Return the rows at which an input has just jumped; values: of the input, (n_rows,)."""
+    mask = np.zeros(values.size, dtype=np.bool_)
+    change = np.abs(np.diff(values))
+    if change.size:
+        least = max(SUDDEN * float(np.quantile(change, USUAL)), SUDDEN_SHARE * float(np.ptp(values)))
+        for place in np.flatnonzero(change > least):
+            mask[place : place + AFTER_SUDDEN] = True
+    return mask
+
+
+def in_runs(true: Mask, shortest: int) -> Mask:
+    """Return the runs of a mask that are so long or longer."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], true, [False]]).astype(np.int8)))
+    mask = np.zeros(true.size, dtype=np.bool_)
+    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+        mask[begin:end] = end - begin >= shortest
+    return mask

@@ -7,11 +7,23 @@ import numpy as np
 
 from armid.errors import ArmidError
 from armid.model import Array
-from armid.record.broken import Broken, after_sudden, in_runs, repeated_samples, wild_samples
-from armid.record.noise import FEWEST_REST_SAMPLES, difference_rms, noise_of, rest_between
-from armid.record.record import Noise, RecordWarning, Signal
+from armid.record.record import RecordWarning, Signal
 from armid.record.resample import FEWEST_SAMPLES, Timing, gap_samples, is_constant, moved_onto_grid
-from armid.record.sensor import Mask, renewed, sensor_of
+from armid.record.sensor import (
+    FEWEST_REST_SAMPLES,
+    Broken,
+    Mask,
+    Noise,
+    after_sudden,
+    difference_rms,
+    in_runs,
+    noise_of,
+    renewed,
+    repeated_samples,
+    rest_between,
+    sensor_of,
+    wild_samples,
+)
 from armid.record.table import CsvTable
 
 TURN_ROUNDING = 1e-6

@@ -161,8 +161,8 @@ class Result(Shown):
 
 
 def write_pages(document: "Document", kind: Kind, files: "NewFiles") -> None:
+    from armid.report.files import markdown
     from armid.report.html import html
-    from armid.report.markdown import markdown
 
     for name, text in ((kind.markdown, markdown(document)), (kind.page, html(document))):
         files.path(name).write_text(text, encoding="utf-8", errors=ODD_NAMES)

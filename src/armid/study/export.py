@@ -17,8 +17,8 @@ from pandas import DataFrame
 
 from armid.report.document import slug, unlike
 from armid.study.analyses.analysis import outcomes
-from armid.study.outcome import RunTrace
 from armid.study.results import StudyResults
+from armid.study.store import RunTrace
 
 VERSION, SUITE = "0.3.5", "armid"
 # No fitness yet, as a number that every program reads.

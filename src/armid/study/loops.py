@@ -15,10 +15,9 @@ from armid.errors import ArmidError, nearest, quoted
 from armid.loop import close_loop, report_of
 from armid.record.reader import NAME, SUFFIX
 from armid.record.schema import unknown_name, validated
-from armid.study.cases import digest_of, unchanged_campaign
-from armid.study.outcome import Performed, Planned, planned
-from armid.study.run_cache import RunCache
+from armid.study.cases import RunCache, digest_of, unchanged_campaign
 from armid.study.spec import CLOSES_LOOP, LOOP_REPORTS, WHOLE, LoopSpec, StudyRegistry, lookup
+from armid.study.store import Performed, Planned, planned
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +26,7 @@ class LoopStudy:
 
     kind: ClassVar[str] = CLOSES_LOOP
     labels: ClassVar[list[str]] = [CLOSES_LOOP]
+    shown: ClassVar[list[str]] = labels
 
     spec: LoopSpec
     text: str

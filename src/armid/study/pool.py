@@ -24,7 +24,7 @@ from threading import Event, Lock, Timer
 from typing import Any
 
 from armid.errors import ArmidError
-from armid.study.outcome import FAILED, MissingRun, Outcome
+from armid.study.store import FAILED, MissingRun, Outcome
 from armid.study.worker import FINISHED, READY, REFUSED
 
 # How often a run may take its worker with it: the first time it may have been someone else's kill.

@@ -17,13 +17,15 @@ import pandas as pd
 
 from armid.errors import ArmidError, StudyError, caused_by, nearest
 from armid.report.result import NewFiles, Shown
-from armid.study.outcome import DONE, RunTrace, unpacked
 from armid.study.store import (
+    DONE,
     FILE_NAME,
     WAIT_S,
+    RunTrace,
     check_format,
     connected,
     translate_errors,
+    unpacked,
 )
 
 if TYPE_CHECKING:

@@ -16,9 +16,8 @@ from armid.errors import ArmidError, StudyError, caused_by, nearest
 from armid.estimation.identify import ctrl_c_waits
 from armid.progress import announced, console
 from armid.report.result import refuse_unwritable
-from armid.study.outcome import Outcome
 from armid.study.pool import DaskPool, LocalPool, WorkerSetup, performed_apart
-from armid.study.store import FILE_NAME, Counts, Store
+from armid.study.store import FILE_NAME, Counts, Outcome, Store
 from armid.study.tasks import Task, read_study
 
 if TYPE_CHECKING:
@@ -199,7 +198,7 @@ def _patterns(only: str, study: Task) -> tuple[str, str]:
     """Return the patterns of case and identifier; CASE alone means all identifiers."""
     case, _, identifier = only.partition("/")
     patterns = (case or "*", identifier or "*")
-    names = (study.case_names, study.labels)
+    names = (study.case_names, study.shown)
     for what, pattern, known in zip(("case", "identifier"), patterns, names, strict=True):
         if not any(name == pattern or fnmatchcase(name, pattern) for name in known):
             raise ArmidError(f"only '{only}': no {what} is called '{pattern}', {nearest(pattern, known)}")

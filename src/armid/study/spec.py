@@ -146,11 +146,12 @@ QUESTION = key(any_text, "a text", "The question that the study answers, shown a
 SEEDS = key(seeds, "at most 1,000,000 seeds or a list", "Seeds of the searches, one run each; n means 1 to n.")
 PER_PARAMETER = key(
     rising_counts, "a whole number above 0, or a rising list of such",
-    "Budget of a problem of the suite: simulations for each of its free parameters.",
+    "Simulations of a run for each free parameter.",
 )  # fmt: skip
 BUDGETS = key(
     rising_counts, "a whole number of simulations above 0, or a rising list of such",
-    "Simulations of a run, of each where there are several; one candidate through all train records counts as one.",
+    "Simulations of a run, of each where there are several; one candidate through all train records counts as one. "
+    "With budget_per_parameter it may be left out, and no run has more.",
 )  # fmt: skip
 SEED = key(any_whole, "a whole number of at least 0", "Seed of what is drawn at random.")
 
@@ -275,8 +276,8 @@ class StudySpec:
         list_of(table_for(EntrySpec), 1), "at least one table headed [[identifiers]]",
         "The optimisers that are compared.",
     ))  # fmt: skip
-    budget: tuple[int, ...] = field(metadata=BUDGETS)
     seeds: tuple[int, ...] = field(metadata=SEEDS)
+    budget: tuple[int, ...] = field(default=(), metadata=BUDGETS)
     question: str = field(default="", metadata=QUESTION)
     kind: str = field(default=IDENTIFIES, metadata=kind_key(IDENTIFIES))
     report: str = field(default="", metadata=report_key(REPORTS))

@@ -1,7 +1,8 @@
 """What a study can be: a task that plans its runs and performs one of them.
 
 There are two: `Study` identifies parameters, here below, and `LoopStudy` (see loops) closes the loop on campaigns. Both
-have name, kind, folder of their file, registry, case_names (what they are tried on), labels (who tries), n_runs, and
+have name, kind, folder of their file, registry, case_names (what they are tried on), labels (who tries), shown (their
+names in tables), n_runs, and
 
 - check(performed): refuse what cannot be run, before anything is written
 - description(out): what a report needs to know, as JSON can hold it; out: folder of the store
@@ -11,9 +12,10 @@ have name, kind, folder of their file, registry, case_names (what they are tried
 
 import errno
 import json
+import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from datetime import UTC, datetime
 from functools import cache, cached_property
 from itertools import product
@@ -24,6 +26,7 @@ import numpy as np
 
 from armid.errors import ArmidError, MachineError, StudyError, caused_by, quoted
 from armid.estimation.identify import INTERRUPTED, Identification, identified, versions_of
+from armid.identifiers import options_of
 from armid.model import Model
 from armid.problem.fitness import fitness_of_name
 from armid.problem.problem import by_record
@@ -32,10 +35,9 @@ from armid.progress import announced
 from armid.record import Campaign
 from armid.record.schema import load_toml, unknown_name, validated
 from armid.registry import place_in_plugin
-from armid.study.cases import Case, cases_of, clean_records
-from armid.study.outcome import DONE, FAILED, MissingRun, Outcome, Performed, Planned, packed, planned
-from armid.study.run_cache import RunCache
+from armid.study.cases import Case, RunCache, cases_of, clean_records
 from armid.study.spec import (
+    BUDGETS,
     CLOSES_LOOP,
     IDENTIFIES,
     KIND_NAMES,
@@ -47,6 +49,7 @@ from armid.study.spec import (
     lookup,
     study_registry,
 )
+from armid.study.store import DONE, FAILED, MissingRun, Outcome, Performed, Planned, packed, planned
 from armid.units import DEG
 
 if TYPE_CHECKING:
@@ -154,7 +157,7 @@ class Entry:
     """One identifier of a study with all that was left to the study filled in.
 
     several: budgets of its runs. per_parameter: simulations a free parameter, used instead where there are any; no run
-    then has more than the largest of `several`.
+    then has more than the largest of `several`, where there are any.
     """
 
     label: str
@@ -168,11 +171,12 @@ class Entry:
 
     @property
     def budget(self) -> int:
-        """Largest budget of a run."""
-        return max(self.several)
+        """Largest budget of a run; with budgets a parameter alone, that of one parameter."""
+        return max(self.several or self.per_parameter)
 
     def budgets(self, n_free: int) -> list[int]:
-        return sorted({min(self.budget, factor * n_free) for factor in self.per_parameter}) or [*self.several]
+        most = max(self.several, default=sys.maxsize)
+        return sorted({min(most, factor * n_free) for factor in self.per_parameter}) or [*self.several]
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,6 +206,11 @@ class Study:
     def labels(self) -> list[str]:
         """Labels of the identifiers, each as often as it is there."""
         return [entry.label for entry in self.entries]
+
+    @property
+    def shown(self) -> list[str]:
+        """Labels, and labels with a fitness, as tables show them where there are several."""
+        return self.labels + [f"{entry.label} on {fitness}" for entry in self.entries for fitness in entry.fitness]
 
     @classmethod
     def read(cls, table: Mapping[str, Any], text: str, folder: Path, where: str, registry: StudyRegistry) -> "Study":
@@ -271,9 +280,9 @@ class Study:
             "unit": self.cases[0].model.plant.output_unit,
             "angle": angles.pop() if len(angles) == 1 else DEG,
             "effects": list(spec.effects),
-            "budget": max(spec.budget),
+            "budget": max(entry.budget for entry in entries),
             "fitness": list(dict.fromkeys(f for e in entries for f in e.fitness)),
-            "identifiers": list(dict.fromkeys(self.labels)),
+            "identifiers": list(dict.fromkeys(entry.label for entry in entries)),
             "noise_deg_s": list(dict.fromkeys(n for e in entries for n in e.noise_deg_s)),
             "seeds": list(dict.fromkeys(s for e in entries for s in e.seeds)),
             "windows": [window_text(w) for w in spec.windows_s],
@@ -370,17 +379,29 @@ def _entries(spec: StudySpec, unit: str, registry: StudyRegistry, where: str) ->
     for i, table in enumerate(spec.identifiers):
         name = table.get("label", table.get("name"))
         at = f"{where}, identifier {quoted(name) if isinstance(name, str) else i + 1}"
+        _refuse_options(table, registry, at)
         own = validated(EntrySpec, table, at)
         noise = _levels(own, spec, unit, where, at)
         entry = Entry(own.label or own.name, own.name, dict(own.options), own.budget or spec.budget,
                       own.fitness or spec.fitness, noise, own.seeds or spec.seeds,
                       own.budget_per_parameter or spec.budget_per_parameter)  # fmt: skip
+        if not (entry.several or entry.per_parameter):
+            raise ArmidError(f"{where}: key 'budget' is missing, {BUDGETS['expected']} is expected")
         _check_built(entry, registry, at)
         entries.append(entry)
     for i, entry in enumerate(entries):
         for other in entries[:i]:
             _check_apart(entry, other, where)
     return tuple(entries)
+
+
+def _refuse_options(table: Mapping[str, Any], registry: StudyRegistry, where: str) -> None:
+    """Refuse an option of an identifier that stands outside its options."""
+    known = {f.name for f in fields(EntrySpec)}
+    for key in table:
+        name = table.get("name")
+        if key not in known and isinstance(name, str) and key in options_of(registry.identifier(name, where)):
+            raise ArmidError(f"{where}: key '{key}' is an option of {name}, options = {{ {key} = ... }} is expected")
 
 
 def _levels(own: EntrySpec, spec: StudySpec, unit: str, where: str, at: str) -> tuple[float, ...]:

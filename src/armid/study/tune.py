@@ -22,9 +22,9 @@ from armid.report.document import Column, Document, listed, table
 from armid.study.analyses.analysis import TARGETS, first_hits, remaining_share
 from armid.study.analyses.convergence import area_over_curve
 from armid.study.cases import suite_cases
-from armid.study.outcome import DONE
 from armid.study.results import StudyResults, load_study
 from armid.study.runner import Ending, Progress, run
+from armid.study.store import DONE
 from armid.study.tasks import Entry, Study
 
 

@@ -9,7 +9,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 
 from armid.errors import ArmidError, MachineError
-from armid.study.run_cache import RunCache
+from armid.study.cases import RunCache
 from armid.study.spec import study_registry
 from armid.study.tasks import perform, task_type
 

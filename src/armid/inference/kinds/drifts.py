@@ -11,8 +11,7 @@ from armid.inference.evidence import Expansion, Forecast
 from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.kinds.faults import simulated_file, with_measured
 from armid.inference.library import Library
-from armid.inference.model import Fit
-from armid.inference.refit import free_values, unless_diverged
+from armid.inference.model import Fit, free_values, unless_diverged
 from armid.inference.unknowns import Unknown, freed
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array

@@ -11,8 +11,7 @@ from armid.inference.decisions import calibration
 from armid.inference.evidence import SCALES, Expansion, Forecast
 from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.library import Library, activation_grid
-from armid.inference.model import ROUGHLY, Fit, fit_from
-from armid.inference.refit import candidate_at, free_values, responses, unless_diverged
+from armid.inference.model import ROUGHLY, Fit, candidate_at, fit_from, free_values, responses, unless_diverged
 from armid.inference.unknowns import freed, moved, projected
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array

@@ -15,8 +15,7 @@ from armid.inference.evidence import Expansion, Forecast
 from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.library import Library
 from armid.inference.missing_signal import Segment, segments_about
-from armid.inference.model import Fit, fit_from
-from armid.inference.refit import unless_diverged
+from armid.inference.model import Fit, fit_from, unless_diverged
 from armid.inference.unknowns import Freed, freed
 from armid.inference.whitening import Cover, WhiteRecords
 from armid.model import Array

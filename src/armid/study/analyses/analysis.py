@@ -12,9 +12,9 @@ from pandas import DataFrame, Series
 from armid.model import Array
 from armid.problem.fitness import FITNESS
 from armid.report.document import Column, Part, Table
-from armid.study.outcome import RunTrace
 from armid.study.results import StudyResults
 from armid.study.spec import NOISES
+from armid.study.store import RunTrace
 from armid.units import scale_of
 
 Small = NDArray[np.float32]
