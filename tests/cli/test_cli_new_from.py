@@ -100,7 +100,7 @@ def test_a_parameter_among_the_constants_is_refused_with_the_key_to_write(run, r
     sheet.write_text(guessed.replace("[[records]]", "[constants]\ngain = 0.5\n\n[[records]]", 1))
     assert "is a parameter of plant 'rotary_arm', [parameters.gain] with fixed = VALUE is" in refused("check", "mine")
     sheet.write_text(guessed.replace("[[records]]", "[parameters.gain]\nfixed = 0.5\n\n[[records]]", 1))
-    assert "at mid-range, measured up to" in run("check", "mine").out
+    assert "with parameters in the middle of their ranges, measured up to" in run("check", "mine").out
 
 
 @pytest.mark.parametrize(("text", "words"), [

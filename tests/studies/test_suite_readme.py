@@ -47,7 +47,7 @@ def test_a_foreign_optimiser_is_compared_by_one_command(blocks, root, tmp_path):
     command = [sys.executable, "-m", "armid", "study", "yours.toml", "--plugin", "mine.py:mine", "--out", "out"]
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert "The paper's swarm (pso) comes" in done.stdout
+    assert "The paper's swarm (pso) is number" in done.stdout
     assert "mine" in done.stdout
 
 

@@ -357,8 +357,8 @@ def unlike(file: str, error: float) -> DataIssue:
 
 
 def beyond(file: str, error: float) -> DataIssue:
-    said = (f"{file}: the declared model misses it by {error:.3g} of its signal wherever it fits the train records "
-            "best, and no mistake that was tried explains that: whether a record is wrong stays open.")  # fmt: skip
+    said = (f"{file}: the declared model, fitted to the train records, misses it by {error:.3g} times its signal, and "
+            "no other sign, unit, clock or manoeuvre explains that: the record or the model may be wrong.")  # fmt: skip
     return DataIssue("unjudged", file, said)
 
 

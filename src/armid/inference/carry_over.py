@@ -49,7 +49,8 @@ class Missed:
         error, train = (shown(e, self.unit)[0] for e in self.errors)
         unit = shown(1.0, self.unit)[1]
         said = [f"{self.record} does not carry over: it is missed by {error:.3g} {unit}, the train "
-                f"records by {train:.3g}. In noise and doubt this is {self.factor:.3g} times as much."]  # fmt: skip
+                f"records by {train:.3g}. Measured by noise and by the doubt "
+                f"of the parameters, this is {self.factor:.3g} times as much."]  # fmt: skip
         if self.outside:
             reach = [f"{name} reaches {shown(value, unit)[0]:.3g} {shown(1.0, unit)[1]} (train: "
                      f"{shown(end, unit)[0]:.3g})" for name, (value, end, unit) in self.outside.items()]  # fmt: skip

@@ -456,8 +456,11 @@ def missing_sentences(missing: Missing) -> list[str]:
     ranked = sorted((d for d in best.values() if d.share >= LEAST_SHARE), key=lambda d: -d.share)[:MOST_PORTS]
     curves = ", ".join(f"{d.variable}{TIMES[d.factor]} at {d.port} {d.share:.0%}" for d in ranked)
     if not curves:
-        return [*said, "On what it depends was not found: no curve predicts parts left out of its fit."]
-    return [*said, f"On what it depends, by the share that a curve predicts on parts left out of its fit: {curves}."]
+        return [*said, "What the residual follows was not found: no curve predicts parts left out of its fit."]
+    return [
+        *said,
+        f"What the residual follows, with the share that a curve over it predicts on parts left out: {curves}.",
+    ]
 
 
 def diagnosis_sentences(seen: Residuals) -> list[str]:

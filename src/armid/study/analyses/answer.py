@@ -87,9 +87,13 @@ def repeats(evidence: Evidence, _: DataFrame) -> tuple[str, ...]:
 
 
 def by_fitness(evidence: Evidence, _: DataFrame) -> tuple[str, ...]:
-    """Return, where identifiers ran on several fitnesses, which of these comes nearest to the truth at each noise."""
-    runs = evidence.runs
-    if runs.groupby("identifier")["fitness"].nunique().max() < 2:
+    """Return, where identifiers ran on several fitnesses, which of these comes nearest to the truth at each noise.
+
+    Of the identifiers that ran on the most fitnesses alone: others would compare identifiers, too.
+    """
+    several = evidence.runs.groupby("identifier")["fitness"].transform("nunique")
+    runs = evidence.runs[several == several.max()]
+    if several.max() < 2:
         return ()
     said = []
     for setting in noisy_first(evidence)[:MOST_SETTINGS]:
