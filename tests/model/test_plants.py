@@ -10,6 +10,7 @@ from armid.engine import Schedule, simulate
 from armid.errors import ArmidError
 from armid.inference.candidates import EffectKey, constant_effects
 from armid.model import PLANTS, Manoeuvre, Model, Scales
+from armid.model.parameter import warn_if_far
 from armid.model.plants import flexible_link as link
 
 PLANT = PLANTS["shell_transfer_arm"]
@@ -100,3 +101,8 @@ def test_what_is_known_roughly_is_corrected_wherever_it_stands() -> None:
     other = Manoeuvre(5e-3, 101, told | {"gravity_moment": 0.2}, motion.inputs)
     expected = [simulate(plain, m, [[j]], Schedule(8)).output[0] for m, j in ((motion, 0.1), (other, 0.125))]
     np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def test_a_negative_bound_of_what_is_positive_warns():
+    with pytest.warns(UserWarning, match=r"bounds inertia = -1 to 0.02 is negative, outside the declared range"):
+        warn_if_far(PLANTS["rotary_arm"].parameters[0], [-1.0, 0.02], "bounds inertia = -1 to 0.02")

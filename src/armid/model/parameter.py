@@ -53,11 +53,16 @@ FAR = 20.0
 
 
 def warn_if_far(parameter: Parameter, values: Sequence[float], where: str) -> None:
-    """Warn where every value is far outside the declared range (SI), as a forgotten factor of the unit gives."""
+    """Warn where every value is far outside the declared range (SI), as a forgotten factor of the unit gives.
+
+    A negative value of what is declared to be positive warns as well: no inertia is below 0.
+    """
     low, high = parameter.low, parameter.high
-    if all(abs(v) > FAR * max(abs(low), abs(high)) or (low > 0.0 and FAR * v < low) for v in values):
-        declared = f"{low:g} to {high:g} {parameter.unit}"
-        warnings.warn(f"{where} is far outside the declared range, {declared}; it is taken as it is", stacklevel=3)
+    declared = f"the declared range, {low:g} to {high:g} {parameter.unit}; it is taken as it is"
+    if low > 0.0 and any(v < 0.0 for v in values):
+        warnings.warn(f"{where} is negative, outside {declared}", stacklevel=3)
+    elif all(abs(v) > FAR * max(abs(low), abs(high)) or (low > 0.0 and FAR * v < low) for v in values):
+        warnings.warn(f"{where} is far outside {declared}", stacklevel=3)
 
 
 WORDS = ("effort", "speed", "inertia", "s", "1")
