@@ -391,7 +391,7 @@ def test_what_the_declared_model_misses_cannot_be_judged(campaign):
     said = said_of(folder)
     assert len(said) == 1, said
     (sentence,) = said
-    assert sentence.startswith("lower.csv: the declared model misses it by ")
+    assert sentence.startswith("lower.csv: the declared model, fitted to the train records, misses it by ")
     assert sentence.endswith("the record or the model may be wrong.")
     read = read_campaign(folder)
     (point,) = [p for p in check_campaign(read, dict(EFFECTS)) if p.name.startswith("plausible")]
