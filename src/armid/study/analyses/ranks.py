@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from pandas import DataFrame, Series
 
 from armid.model import Array
+from armid.problem.suite import DEFINITIONS
 from armid.report.document import Column, Figure, Part, Table, Text, listed, slug
 from armid.report.style import INK, line_look, pyplot
 from armid.study.analyses.analysis import BUDGET, VARIANT, Analysis, Evidence, is_swarm
@@ -430,7 +431,7 @@ def suite_answer(evidence: Evidence) -> tuple[str, ...]:
             )
         said.append(line)
     easy = "fewer than three: the suite is too easy" if len(winners) < 3 else "so the suite is not too easy"
-    if len(evidence.variants) < 3 or set(classes) < set(CLASSES):
+    if len(evidence.variants) < 3 or {case["suite"] for case in evidence.study["cases"]} != DEFINITIONS.keys():
         return tuple(said)
     return (*said, f"{len(winners)} identifiers are best in some class at some budget ({', '.join(sorted(winners))}), "
             f"{easy}.")  # fmt: skip
