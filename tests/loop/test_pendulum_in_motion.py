@@ -63,7 +63,7 @@ def test_the_start_of_an_axis_is_fitted(tmp_path):
     assert not campaign.holdout[0].pieces[0].shown_start
 
 
-def test_a_pendulum_that_goes_over_the_top_is_estimated_from_the_begin_of_its_records(tmp_path):
+def test_a_pendulum_that_goes_over_the_top_is_estimated_from_the_beginning_of_its_records(tmp_path):
     """Simulated for long from a parameter that is a little off, it goes over the top another time."""
     rng, times, tables = np.random.default_rng(1), STEP_S * np.arange(1200), {}
     for i in range(2):
@@ -80,7 +80,7 @@ def test_a_pendulum_that_goes_over_the_top_is_estimated_from_the_begin_of_its_re
     assert declared.x == pytest.approx([INERTIA, GRAVITY_MOMENT, 0.01], rel=1e-3)
     assert declared.chi2 < 1.3 * len(declared.residual)
     problem = declared.records
-    assert problem.begin(0.25).chi2(declared.z)[0] < 0.5 * problem.chi2(declared.z)[0]
+    assert problem.beginning(0.25).chi2(declared.z)[0] < 0.5 * problem.chi2(declared.z)[0]
 
 
 @pytest.mark.slow

@@ -1,4 +1,7 @@
-"""Compiled simulators: one generated module for each model, kept on disk so that a second start compiles nothing."""
+"""Compiled simulators: one generated module for each model, kept on disk so that a second start compiles nothing.
+
+This is the one place that knows where compiled code lies. It checks what it reads, and does without a disk if it must.
+"""
 
 import gc
 import hashlib

@@ -12,25 +12,27 @@ from armid.model import Array, Manoeuvre, ManoeuvreKey, Plant
 from armid.record import Piece, Record, Signal
 from armid.record.start import Track, state_shown
 
-# Mistakes of one unit each; of angles and turning speeds, and of turning speeds alone.
-IN_DEGREES, ANGULAR, TURNING = 180.0 / np.pi, ("rad", "rad/s"), ("rad/s",)
+IN_DEGREES = 180.0 / np.pi
+# Units in which a mistake can be made that is one of angles and turning speeds, of turning speeds, of any signal.
+ANGULAR, TURNING, ANY = ("rad", "rad/s"), ("rad/s",), ()
+# Factor that undoes a mistake -> kind, units of the signals in which it can be, words. Inputs have those of any signal.
 FACTORS = {
-    -1.0: ("sign", "its sign looks inverted: with the other one"),
-    IN_DEGREES: (ANGULAR, "57.3 times too small, as radians under a header in degrees are: in the other unit"),
-    1.0 / IN_DEGREES: (ANGULAR, "57.3 times too large, as degrees under a header in radians are: in the other unit"),
-    30.0 / np.pi: (
-        TURNING,
-        "9.55 times too small, as a mistake between rad/s and revolutions per minute makes it: corrected",
-    ),
-    np.pi / 30.0: (TURNING, "9.55 times too large, as revolutions per minute under a header in rad/s are: corrected"),
-    6.0: (TURNING, "6 times too small, as revolutions per minute under a header in deg/s are: corrected"),
-    10.0: ("unit", "10 times too small: ten times as large"),
-    0.1: ("unit", "10 times too large: a tenth as large"),
-    1000.0: ("unit", "1,000 times too small, as thousands under a plain unit are: corrected"),
-    0.001: ("unit", "1,000 times too large, as thousandths (mm, ms) under a plain unit are: corrected"),
-    2.0: ("gain", "half as large as it should be: doubled"),
-    0.5: ("gain", "twice as large as it should be: halved"),
-}
+    -1.0: ("sign", ANY, "its sign looks inverted: with the other one"),
+    IN_DEGREES: ("unit", ANGULAR, "57.3 times too small, as radians under a header in degrees are: in the other unit"),
+    1.0 / IN_DEGREES: ("unit", ANGULAR,
+                       "57.3 times too large, as degrees under a header in radians are: in the other unit"),
+    30.0 / np.pi: ("unit", TURNING,
+                   "9.55 times too small, as a mistake between rad/s and revolutions per minute makes it: corrected"),
+    np.pi / 30.0: ("unit", TURNING,
+                   "9.55 times too large, as revolutions per minute under a header in rad/s are: corrected"),
+    6.0: ("unit", TURNING, "6 times too small, as revolutions per minute under a header in deg/s are: corrected"),
+    10.0: ("unit", ANY, "10 times too small: ten times as large"),
+    0.1: ("unit", ANY, "10 times too large: a tenth as large"),
+    1000.0: ("unit", ANY, "1,000 times too small, as thousands under a plain unit are: corrected"),
+    0.001: ("unit", ANY, "1,000 times too large, as thousandths (mm, ms) under a plain unit are: corrected"),
+    2.0: ("gain", ANY, "half as large as it should be: doubled"),
+    0.5: ("gain", ANY, "twice as large as it should be: halved"),
+}  # fmt: skip
 TURNS = (90.0, -90.0, 180.0)
 # Samples that a piece must keep.
 FEWEST_LEFT = 20
@@ -105,14 +107,13 @@ def corrections(plant: Plant, record: Record, shift: int) -> Iterator[Correction
 
 
 def corrections_of_sizes(plant: Plant, record: Record) -> Iterator[Correction]:
-    for factor, (kind, words) in FACTORS.items():
-        own = "unit" if kind in (ANGULAR, TURNING) else kind
+    for factor, (kind, units, words) in FACTORS.items():
         for one in record.signals:
-            if own == kind or one.unit in kind:
+            if not units or one.unit in units:
                 signal = f"{one.output} [{one.unit}]" if record.signals[1:] else f"{one.unit} signal"
-                yield Correction(str(own), factor, f"the measured {signal}: {words}",
+                yield Correction(kind, factor, f"the measured {signal}: {words}",
                            of_signals(plant, [one.output], lambda x, by=factor: [by * x], factor))  # fmt: skip
-        for name in (i.name for i in plant.inputs if own == kind):
+        for name in (i.name for i in plant.inputs if not units):
             yield Correction("input", factor, f"input '{name}': {words}",
                        of_pieces(partial(with_input, name=name, factor=factor)))  # fmt: skip
     for factor, words in TIMES.items():

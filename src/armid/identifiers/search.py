@@ -1,4 +1,7 @@
-"""What a search is: a function of a task that asks for the fitness of candidates; and how pymoo runs it."""
+"""What a search is: a function of a task that asks for the fitness of candidates; and how pymoo runs it.
+
+Also: the starts of local searches, and what protects the routines of other libraries.
+"""
 
 from abc import abstractmethod
 from collections.abc import Callable

@@ -290,15 +290,14 @@ def declared_fit(library: Library) -> Fit:
 
 
 def grown_start(problem: WhiteRecords) -> Array:
-    """Return the estimate of the begin of each record, carried on to ever longer parts, as shares of the range.
+    """Return the estimate of the beginning of each record, carried on to ever longer parts, as shares of the range.
 
-    A motion that may go over the top has many minima when it is simulated for long, and few at its begin.
+    A motion that may go over the top has many minima over a long time, and few at its beginning.
     """
-    z: Array | None = None
-    for share in GROWING:
-        part = problem.begin(share)
-        z = descend(part, spread_starts(part) if z is None else [z], ROUGHLY)
-    assert z is not None
+    first, *longer = map(problem.beginning, GROWING)
+    z = descend(first, spread_starts(first), ROUGHLY)
+    for part in longer:
+        z = descend(part, [z], ROUGHLY)
     return z
 
 

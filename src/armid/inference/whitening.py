@@ -224,7 +224,7 @@ class WhiteRecords(LeastSquaresProblem):
         """Return whitened signals of whole candidates, (n_candidates, n_samples); shares: see `ReadyRecord.runs`."""
         return self.data.white(signals_of(self.replays, candidates, shares))
 
-    def begin(self, share: float) -> "WhiteRecords":
+    def beginning(self, share: float) -> "WhiteRecords":
         """Return the problem of a share of each piece of the records, from its first sample on."""
         counts = [np.arange(n) < share * n for lengths in self.data.lengths for n in lengths]
         return replace(self, data=replace(self.data, sound=self.data.sound * np.concatenate(counts)))

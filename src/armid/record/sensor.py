@@ -1,4 +1,8 @@
-"""What a sensor does: its step, how long it holds a value, its noise, and samples that are no data."""
+"""What a sensor does: its step, how long it holds a value, its noise, and samples that are no data.
+
+The last are looked for in the rows that bring a new value, as they were read: on an even grid a straight line between
+two rows makes values that no sensor gave.
+"""
 
 import math
 from collections.abc import Sequence
@@ -159,7 +163,7 @@ def noise_of(rest: Array, motion: Array, interval: float, times: Array | None = 
     if is_equal or np.std(rest) < HIDDEN * step:
         apart = difference_rms(motion, times)
         # of a slow motion the steps alone look like up to twice their noise
-        if is_short or apart > max((1.0 + is_equal) * floor, SHOWN_IN_MOTION * size):
+        if is_short or apart > max((2.0 if is_equal else 1.0) * floor, SHOWN_IN_MOTION * size):
             return Noise(max(apart, floor), None, 0.0, 1.0, motion.size, "differences")
     mean = float(np.mean(rest))
     # of equal values the mean can miss the value by its last digit, which would look like correlated noise
@@ -197,9 +201,9 @@ def stands_still(rest: Array, size: float, is_speed: bool) -> bool:
     """
     if is_speed and abs(float(np.mean(rest))) > AT_REST * size:
         return False
-    deviations = rest - np.mean(rest)
-    independent = rest.size / (1.0 + 2.0 * float(np.sum(autocorrelation(deviations) ** 2)))
-    error = 2.0 * float(np.std(rest)) * np.sqrt((1.0 + 2.0 * correlation_sum(deviations)) / rest.size)
+    correlation = autocorrelation(rest - np.mean(rest))
+    independent = rest.size / (1.0 + 2.0 * float(np.sum(correlation**2)))
+    error = 2.0 * float(np.std(rest)) * np.sqrt((1.0 + 2.0 * sum_above_chance(correlation, rest.size)) / rest.size)
     first, second = rest[: rest.size // 2], rest[rest.size // 2 :]
     drifts = abs(float(np.mean(first) - np.mean(second))) > STANDS * error
     sizes = np.maximum([np.std(first), np.std(second)], np.finfo(np.float64).tiny)
@@ -216,12 +220,16 @@ def autocorrelation(deviations: Array) -> Array:
 
 
 def correlation_sum(deviations: Array) -> float:
-    """Return the sum of the autocorrelation over positive lags, at least 0.
+    """Return the sum of the autocorrelation over positive lags, see `sum_above_chance`."""
+    return sum_above_chance(autocorrelation(deviations), deviations.size)
+
+
+def sum_above_chance(correlation: Array, n: int) -> float:
+    """Return the sum of an autocorrelation of n values, at least 0.
 
     It ends before the first lag whose correlation is below 2/sqrt(n), what white noise shows by chance.
     """
-    correlation = autocorrelation(deviations)
-    small = np.flatnonzero(correlation < 2 / np.sqrt(deviations.size))
+    small = np.flatnonzero(correlation < 2 / np.sqrt(n))
     return float(np.sum(correlation[: small[0] if small.size else None]))
 
 
@@ -261,15 +269,15 @@ def difference_rms(motion: Array, times: Array | None = None) -> float:
     is stuck tells nothing of its noise.
     times: [s], (n_rows,), where they are irregular; then divided differences take the place of plain ones.
     """
-    moved = changing(motion)
+    moved, step = changing(motion), step_of(motion)
     if FEWEST_REST_SAMPLES <= moved.sum() < motion.size:
         apart = difference_rms(motion[moved], None if times is None else times[moved])
-        if apart > step_of(motion):
+        if apart > step:
             return apart
     estimates = []
     for order in ORDERS:
         if times is None:
-            spread = step_of(motion) * ((GOLDEN * np.arange(motion.size - order)) % 1.0 - 0.5)
+            spread = step * ((GOLDEN * np.arange(motion.size - order)) % 1.0 - 0.5)
             differences = (np.diff(motion, n=order) + spread) / np.sqrt(comb(2 * order, order))
         else:
             differences = divided_differences(motion, times, order)

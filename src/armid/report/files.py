@@ -1,4 +1,8 @@
-"""Write a document to files: Markdown, tables as CSV with every digit and as LaTeX, figures as PNG and SVG, or PDF."""
+"""Write a document to files: Markdown, tables as CSV with every digit and as LaTeX, figures as PNG and SVG, or PDF.
+
+LaTeX uses `booktabs`, numbers are aligned by `siunitx`, and `graphicx` makes a wide table smaller until it fits: a
+document needs these three packages. A long table is several floats; each repeats the headings.
+"""
 
 import re
 from collections.abc import Callable, Sequence

@@ -148,10 +148,12 @@ CREATE TABLE IF NOT EXISTS loops (
 """
 
 
+# Between identifier and fitness where tables name both.
+ON = " on "
 # Runs that this runner looks at, and those of them that are not finished.
-CHOSEN = """
+CHOSEN = f"""
 (p."case" = :case OR p."case" GLOB :case) AND (p.identifier = :identifier OR p.identifier GLOB :identifier
-OR p.identifier || ' on ' || p.fitness GLOB :identifier)
+OR p.identifier || '{ON}' || p.fitness GLOB :identifier)
 """
 MISSING = f"""
 SELECT p.place, p.run, s.settings FROM plan p JOIN settings s USING (run)

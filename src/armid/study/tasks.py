@@ -49,7 +49,7 @@ from armid.study.spec import (
     lookup,
     study_registry,
 )
-from armid.study.store import DONE, FAILED, MissingRun, Outcome, Performed, Planned, packed, planned
+from armid.study.store import DONE, FAILED, ON, MissingRun, Outcome, Performed, Planned, packed, planned
 from armid.units import DEG
 
 if TYPE_CHECKING:
@@ -210,7 +210,7 @@ class Study:
     @property
     def shown(self) -> list[str]:
         """Labels, and labels with a fitness, as tables show them where there are several."""
-        return self.labels + [f"{entry.label} on {fitness}" for entry in self.entries for fitness in entry.fitness]
+        return self.labels + [f"{entry.label}{ON}{fitness}" for entry in self.entries for fitness in entry.fitness]
 
     @classmethod
     def read(cls, table: Mapping[str, Any], text: str, folder: Path, where: str, registry: StudyRegistry) -> "Study":

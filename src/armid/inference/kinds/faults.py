@@ -1,4 +1,7 @@
-"""Faults of one record as hypotheses: late, a fast clock, an offset, a drift, a gain, another start, another load."""
+"""Faults of one record as hypotheses: late, a fast clock, an offset, a drift, a gain, another start, another load.
+
+Each is undone by a size; `column_of` gives what a unit of it does to the whitened signal.
+"""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

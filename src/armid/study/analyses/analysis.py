@@ -14,7 +14,7 @@ from armid.problem.fitness import FITNESS
 from armid.report.document import Column, Part, Table
 from armid.study.results import StudyResults
 from armid.study.spec import NOISES
-from armid.study.store import RunTrace
+from armid.study.store import ON, RunTrace
 from armid.units import scale_of
 
 Small = NDArray[np.float32]
@@ -319,7 +319,7 @@ def outcomes(runs: DataFrame, parameters: DataFrame, unit: str = SPEED) -> DataF
     noise = runs["noise_deg_s"].map(partial(noise_text, unit=unit))
     largest = runs["run"].map(parameters.groupby("run", sort=False)["relative_error"].max())
     return runs.assign(
-        variant=runs["identifier"].where(~several, runs["identifier"] + " on " + runs["fitness"]),
+        variant=runs["identifier"].where(~several, runs["identifier"] + ON + runs["fitness"]),
         setting=noise if runs["window"].nunique() < 2 else noise + ", " + runs["window"],
         largest_error=largest.where(runs["status"] == "done", np.inf).astype(float),
     )

@@ -1,4 +1,7 @@
-"""The table that answers a study's question: every identifier on one line, or every campaign of closed loops."""
+"""The table that answers a study's question: every identifier on one line, or every campaign of closed loops.
+
+Also the last table of every report: what was run, and why runs stopped.
+"""
 
 from collections.abc import Mapping
 from dataclasses import replace
