@@ -47,19 +47,40 @@ class LinkedLowering(NativeLowering):  # type: ignore[misc]
         return True
 
 
+@register_pass(mutates_CFG=True, analysis_only=False)
+class LoweringApart(LinkedLowering):
+    """Lower a function that stays a call wherever it is linked."""
+
+    _name = "lowering_apart"
+
+    def run_pass(self, state: Any) -> bool:
+        super().run_pass(state)
+        state.library._final_module.get_function(state.cr.fndesc.llvm_func_name).add_function_attribute("noinline")
+        return True
+
+
 class Linked(CompilerBase):  # type: ignore[misc]
     """Compile as numba does, but for machine code."""
 
+    lowering = LinkedLowering
+
     def define_pipelines(self) -> list[Any]:
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        passes.passes = [(LinkedLowering if p is NativeLowering else p, text) for p, text in passes.passes]
+        passes.passes = [(self.lowering if p is NativeLowering else p, text) for p, text in passes.passes]
         passes._finalized = False
         passes.finalize()
         return [passes]
 
 
+class LinkedApart(Linked):
+    """Compile what is rarely called: written into its callers, it would be most of what there is to compile."""
+
+    lowering = LoweringApart
+
+
 # Options of numba.njit for a function that compiled functions alone call.
 LINKED = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": Linked}
+RARE = LINKED | {"pipeline_class": LinkedApart, "forceinline": False}
 
 
 DOUBLE = ir.DoubleType()

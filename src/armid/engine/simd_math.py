@@ -16,6 +16,7 @@ from numba.extending import overload
 
 from armid.engine.simd import (
     LINKED,
+    RARE,
     Lanes,
     any_above,
     exponent_of,
@@ -34,7 +35,7 @@ from armid.engine.simd import (
     with_lane,
 )
 
-compiled = numba.njit(**LINKED)
+compiled, rare = numba.njit(**LINKED), numba.njit(**RARE)
 
 LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
 SMALLEST, LARGEST = 2.2250738585072014e-308, 1.7976931348623157e308
@@ -99,10 +100,14 @@ def lanes_sin(x):
     k = nearest(x * 0.3183098861837907)
     r = fused(k, -PI_C, fused(k, -PI_B, fused(k, -PI_A, x)))
     result = alternate(k) * sine_of_reduced(r)
-    if any_above(fabs(x), FAR):
-        for i in range(n_lanes(x)):
-            if abs(lane(x, i)) > FAR:
-                result = with_lane(result, i, math.sin(lane(x, i)))
+    return sine_of_far(x, result) if any_above(fabs(x), FAR) else result
+
+
+@rare
+def sine_of_far(x, result):
+    for i in range(n_lanes(x)):
+        if abs(lane(x, i)) > FAR:
+            result = with_lane(result, i, math.sin(lane(x, i)))
     return result
 
 
@@ -113,10 +118,14 @@ def lanes_cos(x):
     half = k + 0.5
     r = fused(half, -PI_C, fused(half, -PI_B, fused(half, -PI_A, x)))
     result = -alternate(k) * sine_of_reduced(r)
-    if any_above(fabs(x), FAR):
-        for i in range(n_lanes(x)):
-            if abs(lane(x, i)) > FAR:
-                result = with_lane(result, i, math.cos(lane(x, i)))
+    return cosine_of_far(x, result) if any_above(fabs(x), FAR) else result
+
+
+@rare
+def cosine_of_far(x, result):
+    for i in range(n_lanes(x)):
+        if abs(lane(x, i)) > FAR:
+            result = with_lane(result, i, math.cos(lane(x, i)))
     return result
 
 
@@ -158,10 +167,15 @@ def lanes_power(base, exponent):
     """Return a**b: exp(b log a) where a > 0 and that is a number, the scalar function in the other lanes."""
     a, b = select(1.0, 0.0, base, exponent), select(1.0, 0.0, exponent, base)
     result = lanes_exp(b * lanes_log(a))
-    if any_above(select(a, SMALLEST, result != result, 1.0), 0.5):
-        for i in range(n_lanes(result)):
-            if not (lane(a, i) > SMALLEST and lane(result, i) == lane(result, i)):
-                result = with_lane(result, i, math.pow(lane(a, i), lane(b, i)))
+    is_rare = any_above(select(a, SMALLEST, result != result, 1.0), 0.5)
+    return power_by_lane(a, b, result) if is_rare else result
+
+
+@rare
+def power_by_lane(a, b, result):
+    for i in range(n_lanes(result)):
+        if not (lane(a, i) > SMALLEST and lane(result, i) == lane(result, i)):
+            result = with_lane(result, i, math.pow(lane(a, i), lane(b, i)))
     return result
 
 
