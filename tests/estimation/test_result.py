@@ -137,7 +137,7 @@ def test_a_residual_of_little_more_than_noise_is_told(stand, tmp_path, key, shif
     assert found.information.levels[0].from_residual is noticed
     said = "\n".join(answer(result_of(found), details_of(found)))
     assert "no record was held out, so that nothing judges the model" in said
-    assert ("no interval holds" in said) is noticed
+    assert ("do not rely on the 95 % intervals" in said) is noticed
 
 
 def saved(figure, path):

@@ -120,7 +120,7 @@ def identify_command(
 
     The result is judged on train and holdout. Prints parameters with 95 % intervals (from sensitivities and measured
     noise; for a fitness that is not a sum of squares from 100 to 400 draws of the noise, each minimised again; an
-    interval that does not hold is struck), warnings in words, and errors. Without --out nothing is written. Ctrl-C
+    interval not to rely on is struck through), warnings in words, and errors. Without --out nothing is written. Ctrl-C
     ends the search, judges the best so far, and exits with 130.
     """
     from armid.api import FITNESS, PAPER_FITNESS

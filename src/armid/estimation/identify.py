@@ -187,11 +187,11 @@ class Identification(Result):
             shares = zip(information.names, self.scatter.bias / information.deviation, strict=True)
             doubts |= {name: f"its estimate is biased by {share:.2g} standard deviations"
                        for name, share in shares if abs(share) > BIASED}  # fmt: skip
-        doubts |= dict.fromkeys(held, "its bound holds it")
+        doubts |= dict.fromkeys(held, "it rests at its bound")
         for pair in (pair[:2] for pair in collinear(information)):
             for name, other in (pair, pair[::-1]):
                 if other in held and not doubts[name]:
-                    doubts[name] = f"it is correlated with {other}, which its bound holds"
+                    doubts[name] = f"it is correlated with {other}, which rests at its bound"
         return doubts
 
     @property

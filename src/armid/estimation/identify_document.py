@@ -123,7 +123,7 @@ def lead(free: Mapping[str, Mapping[str, Any]], judged: bool) -> str:
     if len(doubts) == 1 and all(p["low"] is None for p in free.values()):
         return f"Found, without intervals: {doubts.pop()}"
     if len(doubts) == 1:
-        return f"Found, but no interval holds, since {doubts.pop()}"
+        return f"Found, but do not rely on the 95 % intervals, since {doubts.pop()}"
     return "Found, with 95 % intervals where they hold"
 
 

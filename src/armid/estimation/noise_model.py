@@ -15,6 +15,8 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular, toeplitz
 from scipy.special import fdtrc
 
+from armid.engine import FINE
+from armid.engine.calibrate import ALLOWED, NOISE_HIDES
 from armid.errors import ArmidError
 from armid.model import Array, Plant
 from armid.problem.problem import Replay
@@ -24,8 +26,6 @@ from armid.record.record import NOISE_FREE
 from armid.record.sensor import FEWEST_REST_SAMPLES, changing, correlation_sum, difference_rms, memory_of, new_share
 
 T = TypeVar("T")
-# The engine's own error is a 200,000th of the speed scale; a noise of ten times that hides it.
-HIDES_ENGINE = 5e-5
 MOST_TERMS, FEWEST_FOR_COLOUR, MOST_LAGS = 8, 50, 500
 # A mean square of the residual above this many times that of the noise is not noise; below this many errors of the
 # engine it is the engine's.
@@ -108,9 +108,9 @@ def by_sensor(records: Sequence[Record], values: Sequence[T]) -> dict[tuple[str,
 
 
 def noise_floor(sensor: tuple[str, float], plant: Plant) -> float:
-    """Return the noise that hides the engine's own error."""
+    """Return the noise that hides the engine's own error, however finely it simulates."""
     sizes = {"": plant.sizes[0]} | {o.name: size for o, size in zip(plant.outputs, plant.sizes, strict=True)}
-    return HIDES_ENGINE * sizes[sensor[0]]
+    return NOISE_HIDES * ALLOWED[FINE] * sizes[sensor[0]]
 
 
 def levels_left(

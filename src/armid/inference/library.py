@@ -15,7 +15,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from armid.engine import STANDARD, Calibration, Schedule, Simulation, probes, simulate
+from armid.engine import STANDARD, Calibration, Schedule, Simulation, accuracy_against, probes, simulate
 from armid.engine.calibrate import ALLOWED, MARGIN, difference, switch_weights
 from armid.estimation.least_squares import side_by_side
 from armid.inference.candidates import PROBE, Active, EffectKey, bump_at, bundled, compiled, declared_keys, idle, joined
@@ -299,7 +299,7 @@ def calibrated_replays(
     noise: Sequence[float] | None = None,
     hidden: float = 0.0,
 ) -> tuple[Replay, ...]:
-    """Make records ready to be simulated, on the engine's standard accuracy or one that a decision cannot tell from it.
+    """Make records ready to be simulated, as accurately as their noise asks for or as a decision can tell.
 
     near: values about which it is calibrated; the candidates lie within a factor of 2 of them. on_one: on one record of
     each sampling interval, for all others of that interval. noise: of each signal [its unit]; hidden: largest mean
@@ -330,10 +330,11 @@ def calibrated_replays(
             for signal in record.signals:
                 allowed[outputs.index(signal.output) if signal.output else 0] = np.sqrt(hidden) * next(levels)
         record = record.until_window_end()  # noqa: PLW2901
-        likenesses = [p.manoeuvre.interval if on_one else p.manoeuvre.likeness() for p in record.pieces]
+        accuracy = accuracy_against(record.noises, model)
+        likenesses = [(accuracy, p.manoeuvre.interval if on_one else p.manoeuvre.likeness()) for p in record.pieces]
         for likeness, piece in zip(likenesses, record.pieces, strict=True):
             if likeness not in known:
-                known[likeness] = quickly_calibrated(model, piece.manoeuvre, spread, allowed)
+                known[likeness] = quickly_calibrated(model, piece.manoeuvre, spread, allowed, accuracy)
         ready += ReadyRecord(record, model, tuple(known[likeness] for likeness in likenesses)).each
     return tuple(ready)
 
@@ -350,14 +351,16 @@ def finest(*calibrations: Sequence[Calibration]) -> tuple[Calibration, ...]:
     return tuple(max(each, key=lambda one: one.schedule.substeps) for each in zip(*calibrations, strict=True))
 
 
-def quickly_calibrated(model: Model, manoeuvre: Manoeuvre, spread: Array, rms: Array | None = None) -> Calibration:
-    """Return the coarsest of few schedules whose error on the candidates stays within half of the standard one.
+def quickly_calibrated(
+    model: Model, manoeuvre: Manoeuvre, spread: Array, rms: Array | None = None, accuracy: str = STANDARD
+) -> Calibration:
+    """Return the coarsest of few schedules whose error on the candidates stays within half of what is allowed.
 
     Or within half of `rms`, that of each output [its unit], (n_outputs,), as a root mean square over the samples.
     `calibrate` would go on to steps that a screening of candidates cannot pay (a ripple so fine that the motion is a
     matter of chance asks for 128 in a sample), and would look for steps over several samples.
     """
-    allowed = ALLOWED[STANDARD] * model.plant.sizes[0]
+    allowed = ALLOWED[accuracy] * model.plant.sizes[0]
 
     def judged(run: Simulation, finer: Simulation) -> tuple[float, bool, bool]:
         """Return the error of a simulation, whether the noise hides it, and whether it is accurate enough."""

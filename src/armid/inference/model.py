@@ -181,15 +181,15 @@ def fit_from(
     return Fit(tuple(active), records, z, records.plain.residuals(z)[0], rough=rough)
 
 
-def with_standard_accuracy(fit: Fit) -> Fit:
-    """Return a fit about its own starts whose records are simulated on the engine's standard accuracy, or finer."""
+def accurate_enough(fit: Fit) -> Fit:
+    """Return a fit about its own starts whose records are simulated as accurately as their noise asks for."""
     records = fit.records
     each = [ready.record for ready in by_record(records.replays)]
-    standard = calibrated_replays(each, fit.model, records.space, fit.values)
-    if not is_finer(standard, records.replays):
+    enough = calibrated_replays(each, fit.model, records.space, fit.values)
+    if not is_finer(enough, records.replays):
         return with_own_starts(fit)
     # The pieces are those of the fit, whose constants may be others than the record's; none is simulated coarser.
-    theirs = {r.record.file: r.calibrations for r in standard}
+    theirs = {r.record.file: r.calibrations for r in enough}
     replays = with_each(records.replays, lambda ours: replace(
         ours, calibrations=finest(theirs[ours.record.file], ours.calibrations)))  # fmt: skip
     again = fit_from(replace(records, replays=replays), fit.active, [fit.z])

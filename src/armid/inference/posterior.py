@@ -29,8 +29,8 @@ UNSEEN = frozenset({("unknown", "output")})
 CONSTANTS = "constants within tolerances"
 # How far unknowns are moved along an axis of their posterior, in deviations; how often, as a wider axis is looked at
 # again. Share of the rise of the sum of squares that slopes foretell from which they are believed, and the least that
-# matters.
-DEVIATIONS, MOST_LOOKS, BELIEVED, LEAST_RISE = 2.0, 4, 0.5, 0.05
+# matters. Times it from which the way is taken to bend, and how often the others then follow it.
+DEVIATIONS, MOST_LOOKS, BELIEVED, LEAST_RISE, BENT, MOST_ANSWERS = 2.0, 4, 0.5, 0.05, 2.0, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,13 +254,20 @@ def confirmed_slopes(fit: Fit, columns: Array, flat: Array, weight: float) -> Ar
         moves = np.where(stays[:, np.newaxis], 0.0, DEVIATIONS * axes)
         shares = room(here[:n_free], moves[:n_free])
         moves = shares * moves
-        rows = np.concatenate([here + moves.T, here - moves.T])
-        residuals = residuals_at(base, unknowns, rows[:, n_free:], rows[:, :n_free])
-        along = root * columns[:, :n] @ axes
-        trios = root * np.stack([residuals[:n], residuals[n:], np.tile(fit.residual, (n, 1))], axis=1)
-        squares = [left(along, i, trio) for i, trio in enumerate(trios)]
-        rise = np.array([0.5 * (above + below) - middle for above, below, middle in squares])
+        rows, along = np.concatenate([here + moves.T, here - moves.T]), root * columns[:, :n] @ axes
         foretold = weight * np.sum((columns[:, :n] @ moves) ** 2, axis=0)
+        middle = np.array([left(along, i, root * fit.residual[np.newaxis])[0][0] for i in range(n)])
+        squares = np.full((n, 2), np.inf)
+        for _ in range(MOST_ANSWERS):
+            residuals = root * residuals_at(base, unknowns, rows[:, n_free:], rows[:, :n_free])
+            answered = [left(along, i, residuals[[i, n + i]]) for i in range(n)]
+            squares = np.fmin(squares, [square for square, _ in answered])
+            rise = squares.mean(axis=1) - middle
+            if not (rise > BENT * foretold).any():
+                break
+            steps = np.concatenate([[axes @ answer[:, side] for _, answer in answered] for side in (0, 1)])
+            rows = rows + np.where(stays, 0.0, np.nan_to_num(steps))
+            rows[:, :n_free] = np.clip(rows[:, :n_free], 0.0, 1.0)
         matters = np.isfinite(rise) & (foretold > LEAST_RISE * shares**2)
         believed = np.where(matters, np.clip(rise / np.maximum(foretold, 1e-300), 0.0, 1.0), 1.0)
         if (believed >= BELIEVED).all():
@@ -271,16 +278,17 @@ def confirmed_slopes(fit: Fit, columns: Array, flat: Array, weight: float) -> Ar
     return columns
 
 
-def left(along: Array, i: int, residuals: Array) -> Array:
+def left(along: Array, i: int, residuals: Array) -> tuple[Array, Array]:
     """Return the squares of residuals, (n_residuals, n_samples), that the slopes along all axes but one cannot take up.
 
-    The ways on which unknowns make up for each other bend: what a straight one leaves the others answer, as far as
-    their priors let them. along: per posterior deviation, so that what the records do not know of an axis is prior.
+    Then the steps along the axes that take up the rest, (n_axes, n_residuals). The ways on which unknowns make up for
+    each other bend: what a straight one leaves the others answer, as far as their priors let them. along: per posterior
+    deviation, so that what the records do not know of an axis is prior.
     """
     others = np.delete(along, i, axis=1)
     square, mixed = others.T @ others, residuals @ others
     answer = np.linalg.solve(square + np.diag(np.maximum(1.0 - np.diag(square), 1e-9)), mixed.T)
-    return np.asarray(np.sum(residuals**2, axis=1) - np.sum(mixed.T * answer, axis=0))
+    return np.sum(residuals**2, axis=1) - np.sum(mixed.T * answer, axis=0), np.insert(answer, i, 0.0, axis=0)
 
 
 def principal_axes(columns: Array, flat: Array, weight: float, n: int) -> Array:

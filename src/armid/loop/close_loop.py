@@ -23,7 +23,7 @@ from armid.inference.hypothesis import Hypotheses, Hypothesis, words
 from armid.inference.infer import Inference, infer, prepared
 from armid.inference.library import Library, calibrated_replays
 from armid.inference.missing_signal import Missing, missing_from
-from armid.inference.model import Fit, beyond, candidate_at, decomposed, unless_diverged, with_standard_accuracy
+from armid.inference.model import Fit, accurate_enough, beyond, candidate_at, decomposed, unless_diverged
 from armid.inference.search import without
 from armid.inference.whitening import WhiteRecords
 from armid.loop.result import (
@@ -199,7 +199,7 @@ def path_of(inference: Inference) -> list[Hypotheses]:
 
 def judge(inference: Inference, model: Hypotheses, campaign: Campaign, within: float) -> Judgement:
     """Return errors, parameters and tests of a model on train and holdout."""
-    library, fit = inference.exploration.library, with_standard_accuracy(inference.exploration.fits[model])
+    library, fit = inference.exploration.library, accurate_enough(inference.exploration.fits[model])
     seen, unseen = train_residuals(fit), holdout_residuals(fit, campaign.holdout, library)
     remains = any(r.diagnosis.significant for r in (seen, unseen) if r is not None)
     effects = (library.candidates[k.declared] for k in fit.active)

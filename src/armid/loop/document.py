@@ -242,8 +242,9 @@ def parameter_table(report: Mapping[str, Any]) -> Table:
     rows = [(name, value_text(p, struck=True), noise_text(p), trust_text(p),
              value_text(before[name], struck=True) if name in before else "") for name, p in after.items()]  # fmt: skip
     note = (
-        "Values with 95 % intervals over all models; of noise alone, as `identify` gives it: were the model in force "
-        "true. Struck (~ ~) where it may not hold: a discrepancy remains, or a bound holds the value."
+        "95 % intervals count all models that were fitted; those of noise alone, which `identify` gives too, take the "
+        "model in force as true. Struck through (~ ~): do not rely on it, as a discrepancy remains, or the value rests "
+        "at its bound."
     )
     return table("Parameters", ["parameter", "after", "of noise alone", "trusted", "before"], rows, note)
 

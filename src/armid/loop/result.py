@@ -34,7 +34,7 @@ IMPLAUSIBLE, DISAGREES, CARRIES_NOT, NO_DISCREPANCY, EXPLAINED, PARTLY, UNEXPLAI
     "partly_explained", "unexplained", "cannot_tell_apart",
 )  # fmt: skip
 # Doubts for which an interval does not hold.
-REMAINS, HELD = "a significant discrepancy remains", "its bound holds it"
+REMAINS, HELD = "a significant discrepancy remains", "it rests at its bound"
 # A shape that armid sets free by itself, such as the width of a sign: nobody needs to widen its range.
 SEARCHED = "it lies at the end of the range that was searched"
 NOT_IDENTIFIED = "it was not identified: its value is declared"
@@ -271,7 +271,7 @@ def estimates(
         if held[space.free_names.index(name)]:
             doubts.append(SEARCHED if owner is not None and name in library.fixed_shapes(owner) else HELD)
         if not max(value - low, high - value) <= within * abs(value):
-            wide = f"its interval reaches further than {within:.0%} from the value"
+            wide = f"its interval reaches more than {within:.0%} away from the value"
             doubts.append(f"{wide} ({'; '.join(causes)})" if causes else wide)
         ends, of_noise = shown_ends(low, high), shown_ends(one.noise_low, one.noise_high)
         estimates.append(Estimate(public, value, unit, *ends, tuple(doubts), *of_noise, causes=causes))

@@ -113,10 +113,10 @@ class Start:
 
     @cached_property
     def weights(self) -> Array:
-        """1/noise of each sample that is seen, the outputs one behind the other, (n_seen,)."""
+        """1/noise of each sample that is seen, 0 of what is guessed, the outputs one behind the other, (n_seen,)."""
         sizes, signals = self.ready.model.plant.sizes, self.ready.record.signals
         noise = [max(s.noise.rms, LEAST_NOISE * sizes[i]) for s, i in zip(signals, self.places, strict=True)]
-        return np.repeat(1.0 / np.array(noise), [s.n_seen(self.piece) for s in signals])
+        return np.concatenate([s.told(self.piece) / size for s, size in zip(signals, noise, strict=True)])
 
     @cached_property
     def measured(self) -> Array:

@@ -108,7 +108,8 @@ class Signal:
     output: its name, "" for a plant's only one. unit: SI. measured: [unit], (n_samples,), on the grid of the record.
     rest: samples before t = 0 [unit], as in the file. data: which samples were measured, (n_samples,), None: all; the
     others hold a straight line between these, which no fit and no error sees. sensor: what the values tell of it.
-    broken: samples that are no data by what is wrong. header: of the column.
+    broken: samples that are no data by what is wrong. header: of the column. guessed: samples that lie beyond the file
+    once its times are corrected, (n_samples,), None: none; they stand among those that are seen, and tell nothing.
     """
 
     output: str
@@ -120,6 +121,7 @@ class Signal:
     sensor: Sensor = field(default_factory=Sensor)
     broken: tuple[Broken, ...] = ()
     header: str = ""
+    guessed: Mask | None = None
 
     def samples(self, piece: Piece) -> Samples:
         """Return the samples of a piece that fitness and errors see: those of its window that were measured."""
@@ -130,6 +132,11 @@ class Signal:
     def seen(self, piece: Piece) -> Array:
         """Return the measured values of a piece that fitness and errors see."""
         return piece.of(self.measured)[self.samples(piece)]
+
+    def told(self, piece: Piece) -> Array:
+        """Return 1 for each seen sample of a piece, 0 for one that is guessed, (n_seen,)."""
+        known = np.ones(self.measured.size) if self.guessed is None else 1.0 - self.guessed
+        return piece.of(known)[self.samples(piece)]
 
     def n_seen(self, piece: Piece) -> int:
         """Return the number of samples of a piece that fitness and errors see."""

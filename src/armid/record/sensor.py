@@ -130,14 +130,17 @@ def renewed(values: Array, hold: int) -> Mask:
 
 
 FEWEST_REST_SAMPLES = 50
-# At rest a sensor whose noise is below this share of its step shows more or less of it, as the step falls. Where the
-# motion holds more noise, and more than a share of its largest value, the motion tells it.
-HIDDEN, SHOWN_IN_MOTION = 0.6, 1e-4
+# At rest a sensor whose noise is below this share of its step shows more or less of it, as the step falls. The motion
+# tells it where its differences of neighbouring orders agree to such a share: there is no motion in them.
+HIDDEN, AGREEMENT = 0.6, 0.15
 # A rest between motions: a speed is this small against its largest value, and mean and size of the values move by so
 # many of their standard errors at most from one half to the other. Of a longer pause the later parts are tried, as a
 # machine runs down.
 AT_REST, STANDS, HALVINGS = 0.01, 3.0, 3
 ORDERS = range(3, 9)
+# Differences beyond so many standard deviations are left out, what that leaves of the rms of normal noise, and how
+# often: the first deviation is that of their median.
+TRIMMED, LEFT_OF_NORMAL, N_TRIMMED = 2.5, 0.9546, 3
 # Multiples of it fill a step evenly.
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 # Neighbours may correlate as the noise of a filtered sensor does: up to the longest memory, from so many standard
@@ -161,9 +164,9 @@ def noise_of(rest: Array, motion: Array, interval: float, times: Array | None = 
     is_short = rest.size < FEWEST_REST_SAMPLES
     is_equal = is_short or np.ptp(rest) == 0.0
     if is_equal or np.std(rest) < HIDDEN * step:
-        apart = difference_rms(motion, times)
+        apart, agrees = noise_in_motion(motion, times)
         # of a slow motion the steps alone look like up to twice their noise
-        if is_short or apart > max((2.0 if is_equal else 1.0) * floor, SHOWN_IN_MOTION * size):
+        if is_short or (agrees and apart > (2.0 if is_equal else 1.0) * floor):
             return Noise(max(apart, floor), None, 0.0, 1.0, motion.size, "differences")
     mean = float(np.mean(rest))
     # of equal values the mean can miss the value by its last digit, which would look like correlated noise
@@ -259,32 +262,43 @@ def new_share(residual: Array) -> float:
 
 
 def difference_rms(motion: Array, times: Array | None = None) -> float:
-    """Return the rms of the noise in a motion [unit], from its differences of high order; the noise is taken as white.
+    """Return the rms of the noise in a motion [unit], see `noise_in_motion`."""
+    return noise_in_motion(motion, times)[0]
+
+
+def noise_in_motion(motion: Array, times: Array | None = None) -> tuple[float, bool]:
+    """Return the rms of the noise in a motion [unit], and whether the next order of differences agrees with it.
+
+    It comes from differences of high order; the noise is taken as white.
 
     The k-th difference of white noise has the variance C(2k, k) sigma^2. The third is taken, which removes slow motion;
     where the next order gives less than a tenth of it, the motion was still in it (low-passed noise falls less fast)
-    and the next is taken. The median of the absolute values keeps the transients of the motion out; differences of a
-    coarse sensor are spread over its step, as else that median is one of a few values.
+    and the next is taken. Differences far beyond the others are transients of the motion: left out. Those of a coarse
+    sensor are spread over its step, as else their median is one of a few values.
     Runs of equal samples are left out where the noise of the others is more than a step of the values: a sensor that
     is stuck tells nothing of its noise.
     times: [s], (n_rows,), where they are irregular; then divided differences take the place of plain ones.
     """
     moved, step = changing(motion), step_of(motion)
     if FEWEST_REST_SAMPLES <= moved.sum() < motion.size:
-        apart = difference_rms(motion[moved], None if times is None else times[moved])
-        if apart > step:
+        apart = noise_in_motion(motion[moved], None if times is None else times[moved])
+        if apart[0] > step:
             return apart
-    estimates = []
+    estimates: list[float] = []
     for order in ORDERS:
         if times is None:
             spread = step * ((GOLDEN * np.arange(motion.size - order)) % 1.0 - 0.5)
             differences = (np.diff(motion, n=order) + spread) / np.sqrt(comb(2 * order, order))
         else:
             differences = divided_differences(motion, times, order)
-        estimates.append(1.4826 * float(np.median(np.abs(differences))))
+        rms = 1.4826 * float(np.median(np.abs(differences)))
+        for _ in range(N_TRIMMED):
+            kept = differences[np.abs(differences) <= TRIMMED * rms]
+            rms = float(np.sqrt(np.mean(kept**2))) / LEFT_OF_NORMAL if rms else 0.0
+        estimates.append(rms)
         if len(estimates) > 1 and estimates[-1] > 0.1 * estimates[-2]:
-            return float(estimates[-2])
-    return float(estimates[-1])
+            return estimates[-2], abs(estimates[-1] - estimates[-2]) <= AGREEMENT * estimates[-2]
+    return estimates[-1], False
 
 
 def changing(motion: Array) -> Mask:

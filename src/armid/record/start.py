@@ -135,12 +135,12 @@ GROWTH, LONGEST = 1.25, 400
 def smoothed(values: Array, index: int, noise: float, slope: bool = False) -> tuple[float, float]:
     """Return the value of a signal at one sample and its standard deviation, or its change from sample to sample.
 
-    A polynomial of degree 1 or 2 is fitted to a window around the sample (one-sided at the ends of a record), which
-    grows from 5 to 400 samples until its squares are more than noise: sum r^2 > noise^2 (f + 3 sqrt(2 f)) with f
-    degrees of freedom, or the same for what the next two degrees explain. The value is that of the polynomial with
-    these two degrees more on the last window that held, so that its bias is small against its deviation. The window of
-    the smallest deviation wins; a signal without noise is not smoothed. Source of the higher degree: Calonico,
-    Cattaneo, Titiunik 2014, doi:10.3982/ECTA11757.
+    A polynomial of degree 1 or 2 is fitted to windows of 5 to 400 samples around the sample (one-sided at the ends of a
+    record). A window holds unless its squares are more than noise: sum r^2 > noise^2 (f + 3 sqrt(2 f)) with f degrees
+    of freedom, or the same for what the next two degrees explain. A short one may fail by chance, so that longer ones
+    are tried all the same. The value is that of the polynomial with these two degrees more, so that its bias is small
+    against its deviation. The window of the smallest deviation wins; a signal without noise is not smoothed. Source of
+    the higher degree: Calonico, Cattaneo, Titiunik 2014, doi:10.3982/ECTA11757.
     """
     best = float(values[index]), noise
     if slope:
@@ -152,9 +152,8 @@ def smoothed(values: Array, index: int, noise: float, slope: bool = False) -> tu
         while n <= min(values.size, LONGEST):
             low = window_at(index, n, values.size)
             estimate = fitted(values[low : low + n], index - low, degree, noise, slope)
-            if estimate is None:
-                break
-            best = min(best, estimate, key=lambda pair: pair[1])
+            if estimate is not None:
+                best = min(best, estimate, key=lambda pair: pair[1])
             n = int(n * GROWTH) + 1
     return best
 

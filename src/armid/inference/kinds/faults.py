@@ -56,7 +56,13 @@ class Fault:
         """Return a record without the fault; output: whose sensor it is, "" for the first."""
         own = output or record.output
         measured = {one.output: self.measured(one, value) for one in record.each if self.touches(own, one.output)}
-        return record.with_measured(measured).with_pieces(lambda piece: self.undone_piece(piece, value, plant))
+        undone = record.with_measured(measured).with_pieces(lambda piece: self.undone_piece(piece, value, plant))
+        first, last = self.lost(record, value)
+        if not first + last:
+            return undone
+        sample = np.arange(record.measured.size)
+        beyond = (sample < first) | (sample >= sample.size - last)
+        return undone.with_signals(lambda s: replace(s, guessed=beyond if s.guessed is None else beyond | s.guessed))
 
     def lost(self, record: Record, value: float) -> tuple[int, int]:
         """Return how many samples at either end of a record have no measured value once its times are corrected."""
