@@ -20,7 +20,7 @@ from armid.engine import cache_folder, compile_model, simulate
 from armid.engine import compile as compiler
 from armid.engine.compile import keep, load_module, module_name, read_whole, unusable, write_whole
 from armid.engine.generate import kernel_parts
-from armid.engine.simd import LINKED, LinkedLibrary
+from armid.engine.simd import LINKED, RARE, LinkedLibrary
 from armid.model import EFFECTS, PLANTS, Effect, Manoeuvre, Model, Parameter
 
 SCRIPT = """
@@ -240,6 +240,17 @@ def test_a_linked_function_is_part_of_those_that_call_it_and_has_no_code_of_its_
         (compiled,) = function.overloads.values()
         assert isinstance(compiled.library, LinkedLibrary)
         assert not compiled.library.codegen._engine.is_symbol_defined(compiled.fndesc.mangled_name)
+
+
+def test_what_is_shared_or_rare_stays_a_call_in_a_function_that_is_written_inline():
+    """Numba hands the option of a caller on to what it calls, which made a model many times as large."""
+    shared, rare = numba.njit(**LINKED, forceinline=False)(lambda x: 2.0 * x + 1.0), numba.njit(**RARE)(lambda x: x**2)
+    caller = numba.njit(**LINKED, forceinline=True)(lambda x: shared(x) + rare(x))
+    outer = numba.njit(lambda x: caller(x) + 1.0)
+    assert outer(3.0) == 17.0
+    texts = [str(next(iter(f.overloads.values())).library._final_module) for f in (shared, rare, caller)]
+    assert ["alwaysinline" in text for text in texts] == [False, False, True]
+    assert ["noinline" in text for text in texts[:2]] == [False, True]
 
 
 def test_one_of_two_threads_that_wait_for_the_same_kernel_says_so(monkeypatch: pytest.MonkeyPatch) -> None:

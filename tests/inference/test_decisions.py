@@ -15,7 +15,7 @@ MOST = 20
 # Constants that are compared with and decide nothing that a user is told, by what they are.
 NUMERICS = {
     "rounding": ("DEPENDENT", "NEGLIGIBLE", "ROUNDING", "ROUGHLY", "LEAST", "SAME_RESPONSE"),
-    "whether differences tell a slope": ("BELIEVED", "LEAST_RISE", "PARALLEL"),
+    "whether differences tell a slope": ("BELIEVED", "LEAST_RISE", "PARALLEL", "BENT", "FOLLOWED"),
     "convergence of fits and of the engine": (
         "SETTLED",
         "NEAR",

@@ -11,7 +11,7 @@ from armid.inference.candidates import EffectKey
 from armid.inference.decisions import WINDOW
 from armid.inference.evidence import expansion_of, forecast
 from armid.inference.hypothesis import Hypothesis
-from armid.inference.kinds import faults
+from armid.inference.kinds import effects, faults
 from armid.inference.library import Library
 from armid.inference.model import best_along
 from armid.inference.search import BEAM, MOST_EFFECTS, Exploration, drops, is_outdone, next_model
@@ -73,6 +73,28 @@ def test_a_fault_that_an_effect_makes_needless_is_dropped(stand, monkeypatch):
     assert again.chi2 == pytest.approx(right.chi2, rel=1e-3)
     found.fits[best] = again
     assert found.log_posterior(best) > found.log_posterior(faulty)
+
+
+@pytest.mark.slow
+def test_a_model_that_missed_its_valley_is_fitted_again_from_the_larger_one(stand):
+    """Else a second name, of no size, would seem as necessary as the first."""
+    campaign = replace(read_campaign(stand(*MANOEUVRES, "--effect", "coulomb=40")), tolerances={})
+    candidates = {n: EFFECTS[n] for n in ("coulomb", "supply_sag")}
+    found = infer(*prepared(Model(campaign.plant), campaign, candidates)).exploration
+    right, _ = found.ranked()[0]
+    assert {h.public for h in right} == {("effect", "coulomb")}
+    fit = found.fits[right]
+    about = expansion_of(fit, found.scale(), found.library)
+    (sag,) = effects.propose(fit, found.known, found.library)
+    both = right | {sag.hypothesis}
+    found.fits[both] = sag.refit(fit, about, forecast(about, sag), np.inf)
+    z = 0.5 * (fit.z + 0.1)
+    found.fits[right] = replace(fit, z=z, residual=fit.records.plain.residuals(z)[0])
+    found._evidence.clear()
+    assert found.ranked()[0][0] == both
+    search.finish_all(found)
+    assert found.ranked()[0][0] == right
+    assert found.fits[right].chi2 == pytest.approx(fit.chi2, rel=1e-3)
 
 
 class Narrow:

@@ -131,4 +131,12 @@ def test_a_coarse_sensor_tells_its_noise_by_the_motion_where_its_step_hides_it_a
         rests = np.round(rng.uniform(-0.5, 0.5, (20, 1)) + rng.normal(0, own, (20, 150)))
         moved = np.round(motion + rng.normal(0, own, (20, motion.size)))
         sized = [noise_of(rest, one, INTERVAL).rms for rest, one in zip(rests, moved, strict=True)]
-        assert np.array(sized) == pytest.approx(np.sqrt(own**2 + 1 / 12), rel=0.2)
+        assert np.array(sized) == pytest.approx(np.sqrt(own**2 + 1 / 12), rel=0.13)
+
+
+def test_the_travel_of_a_coarse_sensor_does_not_matter_only_whether_differences_still_hold_motion(rng):
+    far = np.round(1e4 * MOTION + rng.normal(0, 0.4, MOTION.size))
+    assert noise_of(np.round(rng.normal(0, 0.4, 150)), far, INTERVAL).rms == pytest.approx(0.49, rel=0.08)
+    rest = np.round(rng.normal(0, 0.4, 150))
+    jerky = np.round(np.cumsum(rng.normal(0, 30.0, MOTION.size)))
+    assert noise_of(rest, jerky, INTERVAL).source == "rest"

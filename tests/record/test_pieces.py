@@ -40,6 +40,14 @@ def test_the_deviation_is_honest():
         assert np.mean([deviation for _, deviation in found]) < noise
 
 
+def test_a_coarse_rest_tells_a_speed_although_short_windows_fail_by_chance():
+    for seed in range(100):
+        values = np.round(np.random.default_rng(seed).normal(0.0, 0.4, 140))
+        slope, deviation = smoothed(values, 0, 0.49, slope=True)
+        assert deviation < 0.05
+        assert abs(slope) < 5.0 * deviation
+
+
 def test_a_kink_ends_the_window():
     kinked = np.where(TIMES < 1.0, 0.0, 40.0 * (TIMES - 1.0))
     rng = np.random.default_rng(3)

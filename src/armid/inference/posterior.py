@@ -4,7 +4,7 @@ Every fitted model has its posterior weight; hypotheses that were not fitted wit
 order. A parameter's interval holds 95 % of the mixture of all (Hoeting and others 1999, doi:10.1214/ss/1009212519).
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -29,8 +29,10 @@ UNSEEN = frozenset({("unknown", "output")})
 CONSTANTS = "constants within tolerances"
 # How far unknowns are moved along an axis of their posterior, in deviations; how often, as a wider axis is looked at
 # again. Share of the rise of the sum of squares that slopes foretell from which they are believed, and the least that
-# matters. Times it from which the way is taken to bend, and how often the others then follow it.
-DEVIATIONS, MOST_LOOKS, BELIEVED, LEAST_RISE, BENT, MOST_ANSWERS = 2.0, 4, 0.5, 0.05, 2.0, 4
+# matters. Times it from which the way is taken to bend; how often the others then follow it, and the fall of the rise,
+# as a share of what is left, for which they follow once more.
+DEVIATIONS, MOST_LOOKS, BELIEVED, LEAST_RISE = 2.0, 4, 0.5, 0.05
+BENT, MOST_ANSWERS, FOLLOWED = 2.0, 10, 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -254,20 +256,13 @@ def confirmed_slopes(fit: Fit, columns: Array, flat: Array, weight: float) -> Ar
         moves = np.where(stays[:, np.newaxis], 0.0, DEVIATIONS * axes)
         shares = room(here[:n_free], moves[:n_free])
         moves = shares * moves
-        rows, along = np.concatenate([here + moves.T, here - moves.T]), root * columns[:, :n] @ axes
-        foretold = weight * np.sum((columns[:, :n] @ moves) ** 2, axis=0)
-        middle = np.array([left(along, i, root * fit.residual[np.newaxis])[0][0] for i in range(n)])
-        squares = np.full((n, 2), np.inf)
-        for _ in range(MOST_ANSWERS):
-            residuals = root * residuals_at(base, unknowns, rows[:, n_free:], rows[:, :n_free])
-            answered = [left(along, i, residuals[[i, n + i]]) for i in range(n)]
-            squares = np.fmin(squares, [square for square, _ in answered])
-            rise = squares.mean(axis=1) - middle
-            if not (rise > BENT * foretold).any():
-                break
-            steps = np.concatenate([[axes @ answer[:, side] for _, answer in answered] for side in (0, 1)])
-            rows = rows + np.where(stays, 0.0, np.nan_to_num(steps))
-            rows[:, :n_free] = np.clip(rows[:, :n_free], 0.0, 1.0)
+        along, foretold = root * columns[:, :n] @ axes, weight * np.sum((columns[:, :n] @ moves) ** 2, axis=0)
+
+        def residuals(rows: Array) -> Array:
+            return np.asarray(root * residuals_at(base, unknowns, rows[:, n_free:], rows[:, :n_free]))
+
+        free_axes = np.where(stays[:, np.newaxis], 0.0, axes)
+        rise = rises(residuals, here, moves, free_axes, along, root * fit.residual, foretold, n_free)
         matters = np.isfinite(rise) & (foretold > LEAST_RISE * shares**2)
         believed = np.where(matters, np.clip(rise / np.maximum(foretold, 1e-300), 0.0, 1.0), 1.0)
         if (believed >= BELIEVED).all():
@@ -276,6 +271,32 @@ def confirmed_slopes(fit: Fit, columns: Array, flat: Array, weight: float) -> Ar
         changed = columns[:, :n] @ (axes * kept) @ np.linalg.inv(axes)
         columns = np.hstack([changed, columns[:, n:]])
     return columns
+
+
+def rises(
+    residuals: Callable[[Array], Array], here: Array, moves: Array, axes: Array, along: Array, residual: Array,
+    foretold: Array, n_free: int,
+) -> Array:  # fmt: skip
+    """Return by how much the sum of squares rises along each axis, the mean of both sides, (n,).
+
+    Where the way bends, the other unknowns follow it. residuals: of rows of unknowns. moves: along each axis, as
+    columns. along: the slopes along the axes. residual: at the estimate. foretold: the rise that the slopes foretell.
+    """
+    n, rows = len(here), np.concatenate([here + moves.T, here - moves.T])
+    middle = np.array([left(along, i, residual[np.newaxis])[0][0] for i in range(n)])
+    rise, bends = np.full(n, np.inf), np.ones(n, dtype=np.bool_)
+    for _ in range(MOST_ANSWERS):
+        tried = residuals(rows)
+        answered, before = [left(along, i, tried[[i, n + i]]) for i in range(n)], rise
+        now = np.array([squares.mean() for squares, _ in answered]) - middle
+        rise = np.where(bends, np.fmin(rise, now), rise)
+        bends &= np.isfinite(rise) & (rise > np.where(np.isfinite(before), LEAST_RISE, BENT) * foretold)
+        if not (bends & (before - rise > FOLLOWED * rise)).any():
+            break
+        steps = np.concatenate([[axes @ answer[:, side] for _, answer in answered] for side in (0, 1)])
+        rows = rows + np.nan_to_num(steps)
+        rows[:, :n_free] = np.clip(rows[:, :n_free], 0.0, 1.0)
+    return rise
 
 
 def left(along: Array, i: int, residuals: Array) -> tuple[Array, Array]:

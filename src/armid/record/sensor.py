@@ -165,8 +165,9 @@ def noise_of(rest: Array, motion: Array, interval: float, times: Array | None = 
     is_equal = is_short or np.ptp(rest) == 0.0
     if is_equal or np.std(rest) < HIDDEN * step:
         apart, agrees = noise_in_motion(motion, times)
-        # of a slow motion the steps alone look like up to twice their noise
-        if is_short or (agrees and apart > (2.0 if is_equal else 1.0) * floor):
+        # Of a slow motion the steps alone look like up to twice their noise; what a step hides is less than a step.
+        is_shown = apart > 2.0 * floor if is_equal else floor < apart <= step
+        if is_short or (agrees and is_shown):
             return Noise(max(apart, floor), None, 0.0, 1.0, motion.size, "differences")
     mean = float(np.mean(rest))
     # of equal values the mean can miss the value by its last digit, which would look like correlated noise

@@ -1,0 +1,136 @@
+"""Machines that no shipped plant describes: a carriage with a coarse encoder, an unbalanced disc fed by voltage."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.signal import lsim
+
+from armid import Constant, Input, Output, Parameter, Plant, Scales, State
+from armid.loop import close_loop, report_of
+from armid.model import EFFECTS
+from armid.record import read_campaign, write_campaign
+
+pytestmark = pytest.mark.slow
+RECORD = '[[records]]\nfile = "{}"\nrole = "{}"\n'
+MASS, DAMPING, STEP_MM, OWN_MM, LATE_S = 4.1, 47.0, 0.02, 0.008, 0.013
+INERTIA, TORQUE_CONSTANT, FRICTION, MOMENT, RESISTANCE, DEAD_V = 0.02, 0.25, 0.01, 0.15, 1.2, 0.8
+
+
+def accelerate(drive_effort, drive, torque, damping, speed, mass):
+    return (drive_effort + drive + torque - damping * speed) / mass
+
+
+CARRIAGE = Plant(
+    "carriage",
+    parameters=(Parameter("mass", "kg", 0.5, 15.0), Parameter("damping", "N s/m", 0.0, 200.0)),
+    states=(State("position", "m", lambda speed: speed, lambda start_position: start_position, "position_m"),
+            State("speed", "m/s", accelerate, lambda start_speed: start_speed, "speed_m_s")),
+    quantities={"drive_effort": lambda force: force,
+                "shown": lambda position, position_sensor: position + position_sensor},
+    constants=(Constant("start_position", 0.0, "m"), Constant("start_speed", 0.0, "m/s")),
+    inputs=(Input("force", "N", ("force_N",)),), ports={"torque": "N", "drive": "N", "position_sensor": "m"},
+    aliases={"omega": "speed", "theta": "position"}, scales=Scales(effort=30.0, speed=0.7), from_rest=False,
+    outputs=(Output("position", "shown", "m", port="position_sensor"),),
+)  # fmt: skip
+
+
+def back(winding, torque_constant, v, resistance):
+    return torque_constant * (winding - torque_constant * v) / resistance
+
+
+def turn(drive_effort, drive, back, eccentric_moment, q, friction, v, torque, inertia):
+    return (drive_effort + drive + back - eccentric_moment * np.sin(q) - friction * v + torque) / inertia
+
+
+DISC = Plant(
+    "disc",
+    parameters=(Parameter("inertia", "kg m2", 0.002, 0.1), Parameter("torque_constant", "N m/A", 0.05, 1.0),
+                Parameter("friction", "N m s/rad", 0.0, 0.1), Parameter("eccentric_moment", "N m", 0.0, 1.0)),
+    states=(State("q", "rad", lambda v: v, lambda: 0.0, "angle_rad"),
+            State("v", "rad/s", turn, lambda: 0.0, "speed_rad_s")),
+    quantities={"drive_effort": lambda torque_constant, voltage, resistance: torque_constant * voltage / resistance,
+                "back": back, "shown": lambda v, output: v + output},
+    constants=(Constant("resistance", RESISTANCE, "ohm"),),
+    inputs=(Input("voltage", "V", ("voltage_V",), hold="zero"),),
+    ports={"torque": "N m", "drive": "N m", "winding": "V", "output": "rad/s"},
+    aliases={"omega": "v", "theta": "q"}, scales=Scales(effort=2.0, speed=30.0),
+    outputs=(Output("angular_velocity", "shown", "rad/s", port="output"),),
+)  # fmt: skip
+
+
+def carriage_records(rng, late):
+    """Tables of four records, at rest for half a second; the encoder of one answers late."""
+    times = 0.002 * np.arange(2001)
+    for i in range(4):
+        waves = zip(rng.uniform(4.0, 10.0, 3), rng.uniform(0.4, 3.0, 3), rng.uniform(0.0, 6.0, 3), strict=True)
+        ramp = np.clip((times - 0.5) / 0.5, 0.0, 1.0)
+        force = np.round(ramp * sum(a * np.sin(2.0 * np.pi * f * times + p) for a, f, p in waves), 7)
+        dense = np.interp(0.001 * np.arange(4001), times, force)
+        position = 1e3 * lsim(([1.0 / MASS], [1.0, DAMPING / MASS, 0.0]), dense, 0.001 * np.arange(4001))[1]
+        shown = np.interp(times - (late if i == 1 else 0.0), 0.001 * np.arange(4001), position)
+        shown = STEP_MM * np.round((shown + rng.normal(0.0, OWN_MM, len(times))) / STEP_MM)
+        yield {"time_s": times, "force_N": force, "position_mm": shown}
+
+
+def campaign(folder, plant, records):
+    files = {f"r{i}.csv": table for i, table in enumerate(records)}
+    roles = ["train"] * (len(files) - 1) + ["holdout"]
+    entries = map(RECORD.format, files, roles)
+    return read_campaign(write_campaign(folder, f'name = "{plant.name}"\nplant = "{plant.name}"\n' + "".join(entries),
+                                        files), {plant.name: plant})  # fmt: skip
+
+
+@pytest.mark.parametrize("late", [0.0, LATE_S])
+def test_an_encoder_that_is_fine_for_its_travel_and_coarse_for_its_noise(tmp_path, late):
+    """Its rest shows less noise than its motion; the samples beyond the end of a late file are guessed."""
+    records = campaign(tmp_path, CARRIAGE, carriage_records(np.random.default_rng(21), late))
+    truth = np.hypot(OWN_MM, STEP_MM / np.sqrt(12.0)) * 1e-3
+    assert [r.noise.rms for r in records.records] == pytest.approx([truth] * 4, rel=0.06)
+    starts = [r.pieces[0].manoeuvre.constants["start_speed"] for r in records.records]
+    assert np.abs(starts).max() < 5e-4
+    found = close_loop(records.model(), records, {n: EFFECTS[n] for n in ("coulomb", "torque_offset", "drive_lag")})
+    chances = found.inference.probabilities
+    assert found.steps == ()
+    assert chances["records"].get("late@r1.csv", 0.0) == pytest.approx(1.0 if late else 0.0, abs=0.1)
+    assert chances["unknown"] < 0.2
+    assert found.after.holdout.errors.rmse == pytest.approx(truth, rel=0.1)
+    for estimate, value in zip(found.after.estimates, (MASS, DAMPING), strict=True):
+        assert estimate.low <= value <= estimate.high
+        assert estimate.high - estimate.low < 0.01 * value
+    assert report_of(found)["noise_rms"] == pytest.approx(truth, rel=0.06)
+
+
+def turned(voltage, interval):
+    """Speed of the disc at each sample, by another integrator."""
+    states = [np.zeros(2)]
+    for u in voltage[:-1]:
+        fed = np.sign(u) * max(abs(u) - DEAD_V, 0.0)
+
+        def rates(_, y, fed=fed):
+            current = (fed - TORQUE_CONSTANT * y[1]) / RESISTANCE
+            return [y[1], (TORQUE_CONSTANT * current - FRICTION * y[1] - MOMENT * np.sin(y[0])) / INERTIA]
+
+        states.append(solve_ivp(rates, (0.0, interval), states[-1], rtol=1e-8, atol=1e-9).y[:, -1])
+    return np.array(states)[:, 1]
+
+
+def test_what_speed_and_voltage_cannot_separate_has_the_width_of_its_box(tmp_path):
+    """Inertia, torque constant, moment and dead zone grow alike, along a way that bends; no second name is needed."""
+    rng = np.random.default_rng(22)
+
+    def records():
+        for _ in range(4):
+            voltage = np.repeat(rng.uniform(-9.0, 9.0, 16), 40)
+            voltage[:50] = 0.0
+            speed = turned(voltage, 0.01) + rng.normal(0.0, 0.06, len(voltage))
+            yield {"time_s": 0.01 * np.arange(len(voltage)), "voltage_V": voltage, "angular_velocity_rad_s": speed}
+
+    declared = campaign(tmp_path, DISC, records())
+    found = close_loop(declared.model(), declared, {n: EFFECTS[n] for n in ("dead_zone", "coulomb")})
+    assert [s.effect for s in found.steps] == ["dead_zone"]
+    assert found.inference.probabilities["effects"].get("coulomb", 0.0) < 0.2
+    truths = {"inertia": INERTIA, "torque_constant": TORQUE_CONSTANT, "eccentric_moment": MOMENT}
+    for estimate in found.after.estimates:
+        assert not estimate.trusted
+        if estimate.name in truths:
+            assert estimate.low < truths[estimate.name] < estimate.high
