@@ -95,7 +95,8 @@ VERDICTS = {
     "implausible_records": "Records look wrong",
 }  # fmt: skip
 PROBABILITIES_NOTE = (
-    "Share of the posterior. A name counts only in sets without something unknown. In its place: what may stand there."
+    "Share of the posterior. A name counts only in models without something unknown. In its place: effects that may "
+    "explain the records instead."
 )
 
 
