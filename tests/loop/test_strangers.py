@@ -68,7 +68,7 @@ def carriage_records(rng, late):
         dense = np.interp(0.001 * np.arange(4001), times, force)
         position = 1e3 * lsim(([1.0 / MASS], [1.0, DAMPING / MASS, 0.0]), dense, 0.001 * np.arange(4001))[1]
         shown = np.interp(times - (late if i == 1 else 0.0), 0.001 * np.arange(4001), position)
-        shown = STEP_MM * np.round((shown + rng.normal(0.0, OWN_MM, len(times))) / STEP_MM)
+        shown = np.round(STEP_MM * np.round((shown + rng.normal(0.0, OWN_MM, len(times))) / STEP_MM), 2)
         yield {"time_s": times, "force_N": force, "position_mm": shown}
 
 

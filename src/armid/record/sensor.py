@@ -138,10 +138,9 @@ HIDDEN, AGREEMENT = 0.6, 0.15
 # machine runs down.
 AT_REST, STANDS, HALVINGS = 0.01, 3.0, 3
 ORDERS = range(3, 9)
-# A sensor with less noise than so many steps is coarse: the median of its differences is one of a few values. There the
-# squares of those within so many standard deviations are taken, so often: the first deviation is that of the median.
-# What they leave of the rms of normal noise.
-COARSE, TRIMMED, N_TRIMMED, LEFT_OF_NORMAL = 2.0, 2.5, 3, 0.9546
+# Differences within so many standard deviations are taken, so often: the first deviation is that of their median. What
+# they leave of the rms of normal noise.
+TRIMMED, N_TRIMMED, LEFT_OF_NORMAL = 2.5, 3, 0.9546
 # Multiples of it fill a step evenly.
 GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 # Neighbours may correlate as the noise of a filtered sensor does: up to the longest memory, from so many standard
@@ -275,8 +274,8 @@ def noise_in_motion(motion: Array, times: Array | None = None) -> tuple[float, b
 
     The k-th difference of white noise has the variance C(2k, k) sigma^2. The third is taken, which removes slow motion;
     where the next order gives less than a tenth of it, the motion was still in it (low-passed noise falls less fast)
-    and the next is taken. The median of the absolute values keeps the transients of the motion out. Of a coarse sensor
-    it is one of a few values: there the differences are spread over the step, and those far beyond the others left out.
+    and the next is taken. Differences far beyond the others are transients of the motion: left out. Those of a coarse
+    sensor are spread over its step, as else their median is one of a few values.
     Runs of equal samples are left out where the noise of the others is more than a step of the values: a sensor that
     is stuck tells nothing of its noise.
     times: [s], (n_rows,), where they are irregular; then divided differences take the place of plain ones.
@@ -294,7 +293,7 @@ def noise_in_motion(motion: Array, times: Array | None = None) -> tuple[float, b
         else:
             differences = divided_differences(motion, times, order)
         rms = 1.4826 * float(np.median(np.abs(differences)))
-        for _ in range(N_TRIMMED if rms < COARSE * step else 0):
+        for _ in range(N_TRIMMED):
             kept = differences[np.abs(differences) <= TRIMMED * rms]
             rms = float(np.sqrt(np.mean(kept**2))) / LEFT_OF_NORMAL if rms else 0.0
         estimates.append(rms)
