@@ -7,11 +7,20 @@ transpile: the source of an equation, made self-contained. compile: the module, 
 simd, simd_math: vectors of candidates in numba, and their elementary functions.
 """
 
-from armid.engine.calibrate import FINE, STANDARD, Calibration, accuracy_against, calibrate, golden_steps, probes
+from armid.engine.calibrate import (
+    FINE,
+    STANDARD,
+    Calibration,
+    accuracy_against,
+    calibrate,
+    golden_steps,
+    hiding_noise,
+    probes,
+)
 from armid.engine.compile import cache_folder, compile_model
 from armid.engine.simulate import Prepared, Schedule, Simulation, along, prepare, simulate
 
 __all__ = [
     "FINE", "STANDARD", "Calibration", "Prepared", "Schedule", "Simulation", "accuracy_against", "along",
-    "cache_folder", "calibrate", "compile_model", "golden_steps", "prepare", "probes", "simulate",
+    "cache_folder", "calibrate", "compile_model", "golden_steps", "hiding_noise", "prepare", "probes", "simulate",
 ]  # fmt: skip

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from armid.engine.generate import LONGEST
 from armid.engine.simulate import Schedule, Simulation, simulate
 from armid.errors import ArmidError
-from armid.model import Array, Manoeuvre, Model
+from armid.model import Array, Manoeuvre, Model, Plant
 
 STANDARD, FINE = "standard", "fine"
 # Errors of the recorded signals that are allowed, as shares of their sizes (arm: 2 rad/s).
@@ -41,10 +41,14 @@ class Calibration:
 
 def accuracy_against(noise: Mapping[str, float], model: Model) -> str:
     """Return "fine" where noise (output -> rms) would not hide the standard error of an output, else "standard"."""
-    sizes = {o.name: size for o, size in zip(model.plant.outputs, model.plant.sizes, strict=True)}
-    sizes[""] = model.plant.sizes[0]
-    hidden = all(rms >= NOISE_HIDES * ALLOWED[STANDARD] * sizes[name] for name, rms in noise.items())
+    hidden = all(rms >= hiding_noise(model.plant, name, STANDARD) for name, rms in noise.items())
     return STANDARD if hidden else FINE
+
+
+def hiding_noise(plant: Plant, output: str, accuracy: str) -> float:
+    """Return the rms of the noise of an output, "" for the first, that hides the engine's error at an accuracy."""
+    sizes = {"": plant.sizes[0]} | {o.name: size for o, size in zip(plant.outputs, plant.sizes, strict=True)}
+    return NOISE_HIDES * ALLOWED[accuracy] * sizes[output]
 
 
 def probes(low: Array, high: Array, n_probes: int = N_PROBES) -> Array:

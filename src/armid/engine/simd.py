@@ -78,7 +78,8 @@ class LinkedApart(Linked):
     lowering = LoweringApart
 
 
-# Options of numba.njit for a function that compiled functions alone call.
+# Options of numba.njit for a function that compiled functions alone call, and for one that stays a call in them. Numba
+# hands `forceinline` on from a caller that says nothing else.
 LINKED = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": Linked}
 RARE = LINKED | {"pipeline_class": LinkedApart, "forceinline": False}
 

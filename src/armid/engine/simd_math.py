@@ -94,21 +94,29 @@ def alternate(k):
     return 1.0 - 2.0 * (k - 2.0 * floor_of(k * 0.5))
 
 
+def far_by_lane(function: Callable[[float], float]) -> Any:
+    """Return what replaces a result by the function of the lane, in each lane that holds a far angle."""
+
+    @rare
+    def put(x, result):
+        for i in range(n_lanes(x)):
+            if abs(lane(x, i)) > FAR:
+                result = with_lane(result, i, function(lane(x, i)))
+        return result
+
+    return put
+
+
+with_far_sines, with_far_cosines = far_by_lane(math.sin), far_by_lane(math.cos)
+
+
 @compiled
 def lanes_sin(x):
     """Return sin x, x reduced by multiples of pi."""
     k = nearest(x * 0.3183098861837907)
     r = fused(k, -PI_C, fused(k, -PI_B, fused(k, -PI_A, x)))
     result = alternate(k) * sine_of_reduced(r)
-    return sine_of_far(x, result) if any_above(fabs(x), FAR) else result
-
-
-@rare
-def sine_of_far(x, result):
-    for i in range(n_lanes(x)):
-        if abs(lane(x, i)) > FAR:
-            result = with_lane(result, i, math.sin(lane(x, i)))
-    return result
+    return with_far_sines(x, result) if any_above(fabs(x), FAR) else result
 
 
 @compiled
@@ -118,15 +126,7 @@ def lanes_cos(x):
     half = k + 0.5
     r = fused(half, -PI_C, fused(half, -PI_B, fused(half, -PI_A, x)))
     result = -alternate(k) * sine_of_reduced(r)
-    return cosine_of_far(x, result) if any_above(fabs(x), FAR) else result
-
-
-@rare
-def cosine_of_far(x, result):
-    for i in range(n_lanes(x)):
-        if abs(lane(x, i)) > FAR:
-            result = with_lane(result, i, math.cos(lane(x, i)))
-    return result
+    return with_far_cosines(x, result) if any_above(fabs(x), FAR) else result
 
 
 @compiled

@@ -15,8 +15,7 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular, toeplitz
 from scipy.special import fdtrc
 
-from armid.engine import FINE
-from armid.engine.calibrate import ALLOWED, NOISE_HIDES
+from armid.engine import FINE, hiding_noise
 from armid.errors import ArmidError
 from armid.model import Array, Plant
 from armid.problem.problem import Replay
@@ -89,8 +88,11 @@ def noise_levels(records: Sequence[Record], plant: Plant, others: Sequence[Recor
     plant: the sizes of its outputs give the floor below which the engine's error would count as a discrepancy. others:
     records of the same sensors whose rests count too.
     """
-    pooled = {sensor: pooled_level([r for r in (*records, *others) if sensor_of(r) == sensor],
-                                   noise_floor(sensor, plant)) for sensor in set(map(sensor_of, records))}  # fmt: skip
+    pooled = {
+        sensor: pooled_level([r for r in (*records, *others) if sensor_of(r) == sensor],
+                             hiding_noise(plant, sensor[0], FINE))
+        for sensor in set(map(sensor_of, records))
+    }  # fmt: skip
     return tuple(pooled[sensor_of(r)] for r in records)
 
 
@@ -105,12 +107,6 @@ def by_sensor(records: Sequence[Record], values: Sequence[T]) -> dict[tuple[str,
     for record, value in zip(records, values, strict=True):
         groups.setdefault(sensor_of(record), []).append(value)
     return groups
-
-
-def noise_floor(sensor: tuple[str, float], plant: Plant) -> float:
-    """Return the noise that hides the engine's own error, however finely it simulates."""
-    sizes = {"": plant.sizes[0]} | {o.name: size for o, size in zip(plant.outputs, plant.sizes, strict=True)}
-    return NOISE_HIDES * ALLOWED[FINE] * sizes[sensor[0]]
 
 
 def levels_left(
@@ -133,7 +129,7 @@ def levels_left(
     for replay, level in zip(replays, levels, strict=True):
         sensor = sensor_of(replay.record)
         memory, sizes = shown[sensor]
-        rms = max(float(np.median(np.maximum(sizes, steps[sensor]))), noise_floor(sensor, replay.model.plant))
+        rms = max(float(np.median(np.maximum(sizes, steps[sensor]))), hiding_noise(replay.model.plant, sensor[0], FINE))
         stays = level.known or (level.rms <= rms and not memory)
         noises.append(level if stays else remembering_level(rms, memory))
     return tuple(noises)

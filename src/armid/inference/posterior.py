@@ -283,12 +283,11 @@ def rises(
     columns. along: the slopes along the axes. residual: at the estimate. foretold: the rise that the slopes foretell.
     """
     n, rows = len(here), np.concatenate([here + moves.T, here - moves.T])
-    middle = np.array([left(along, i, residual[np.newaxis])[0][0] for i in range(n)])
     rise, bends = np.full(n, np.inf), np.ones(n, dtype=np.bool_)
     for _ in range(MOST_ANSWERS):
-        tried = residuals(rows)
-        answered, before = [left(along, i, tried[[i, n + i]]) for i in range(n)], rise
-        now = np.array([squares.mean() for squares, _ in answered]) - middle
+        tried, before = residuals(rows), rise
+        answered = [left(along, i, np.array([tried[i], tried[n + i], residual])) for i in range(n)]
+        now = np.array([0.5 * (above + below) - middle for (above, below, middle), _ in answered])
         rise = np.where(bends, np.fmin(rise, now), rise)
         bends &= np.isfinite(rise) & (rise > np.where(np.isfinite(before), LEAST_RISE, BENT) * foretold)
         if not (bends & (before - rise > FOLLOWED * rise)).any():

@@ -64,7 +64,7 @@ class Exploration:
     fits: by the hypotheses that hold in it. forecasts: of each model that was expanded. noise: the scale,
     None: as the model shows it that leaves least. completed: models at their estimates with all unknowns freed, and the
     weight of a square at which they were. refused: models that diverge, are hopeless, or hold a fault that hardly moves
-    its record. dropped: models, and what was left out of them to fit a smaller one.
+    its record.
     """
 
     library: Library
@@ -77,7 +77,6 @@ class Exploration:
     noise: Scale | None = None
     completed: dict[Hypotheses, float] = field(default_factory=dict)
     refused: set[Hypotheses] = field(default_factory=set)
-    dropped: set[tuple[Hypotheses, Hypothesis]] = field(default_factory=set)
     _evidence: WeakKeyDictionary[Fit, dict[Scale, float]] = field(default_factory=WeakKeyDictionary)
     _scale: WeakKeyDictionary[Fit, Scale] = field(default_factory=WeakKeyDictionary)
 
@@ -335,17 +334,16 @@ def drops(exploration: Exploration, model: Hypotheses, again: bool = False) -> l
     """Return the fits of a model without one of its effects, faults or drifts.
 
     A fault that imitated an effect keeps its place with a size of 0 when the effect is added.
-    again: those without an effect that were fitted from elsewhere too, once from here: they may have missed the valley
-    to which the larger model led, and a name that nothing asks for would seem needed.
+    again: those without an effect that were fitted from elsewhere, too: they may have missed the valley to which the
+    larger model led, and a name that nothing asks for would seem needed.
     """
     fit, weight, trials = exploration.fits[model], exploration.scale().weight, list[Trial]()
     sizes = {f.unknown.name for f in fit.others}
     for hypothesis in sorted(model):
         key, is_effect = model - {hypothesis}, hypothesis.kind == "effect"
         is_new = key not in exploration.fits and key not in exploration.refused
-        is_new |= again and is_effect and bool(key) and (model, hypothesis) not in exploration.dropped
-        if is_new and (is_effect or name_of_size(hypothesis) in sizes):
-            exploration.dropped |= {(model, hypothesis)} if again else set()
+        is_asked = is_new or (again and is_effect and bool(key))
+        if is_asked and (is_effect or name_of_size(hypothesis) in sizes):
             trials.append((key, partial(without, fit, hypothesis, exploration.library, weight)))
     return trials
 
@@ -494,10 +492,12 @@ def finish(exploration: Exploration) -> None:
 
 def finish_all(exploration: Exploration) -> None:
     """Bring all models that may count to their estimates, all unknowns freed."""
+    led: set[Hypotheses] = set()
     while True:
-        ranked = exploration.ranked()
-        for key, make in drops(exploration, ranked[0][0], again=True):
+        best, _ = exploration.ranked()[0]
+        for key, make in drops(exploration, best, again=best not in led):
             exploration.take_or_refuse(key, make())
+        led.add(best)
         ranked = exploration.ranked()
         todo = [m for m, value in ranked if value > ranked[0][1] - WINDOW and not is_complete(exploration, m)
                 and not is_outdone(m, value, ranked)]  # fmt: skip
