@@ -134,3 +134,31 @@ def test_what_speed_and_voltage_cannot_separate_has_the_width_of_its_box(tmp_pat
         assert not estimate.trusted
         if estimate.name in truths:
             assert estimate.low < truths[estimate.name] < estimate.high
+
+
+def test_what_the_added_effect_cannot_be_told_apart_from_widens_its_own_strength_too(tmp_path):
+    """The slope that is not declared makes up for all others exactly; a fit with it may not end worse than without."""
+    rng = np.random.default_rng(23)
+
+    def records():
+        for _ in range(3):
+            voltage = np.repeat(rng.uniform(-9.0, 9.0, 12), 40)
+            voltage[:60] = 0.0
+            speed = turned(voltage, 0.01) + rng.normal(0.0, 0.06, len(voltage))
+            yield {"time_s": 0.01 * np.arange(len(voltage)), "voltage_V": voltage, "angular_velocity_rad_s": speed}
+
+    declared = campaign(tmp_path, DISC, records())
+    found = close_loop(declared.model(), declared, {n: EFFECTS[n] for n in ("dead_zone", "viscous")},
+                       fixed={"friction": 0.0})  # fmt: skip
+    chances, estimates = found.inference.probabilities["effects"], {e.name: e for e in found.after.estimates}
+    assert chances["dead_zone"] > 0.95
+    assert 0.1 < chances["viscous"] < 0.9
+    truths = {"inertia": INERTIA, "torque_constant": TORQUE_CONSTANT, "eccentric_moment": MOMENT,
+              "dead_zone.zone": TORQUE_CONSTANT * DEAD_V / RESISTANCE}  # fmt: skip
+    for name, truth in truths.items():
+        assert not estimates[name].trusted
+        assert estimates[name].low < truth < estimates[name].high
+    parents = found.inference.exploration.fits
+    for model, fit in parents.items():
+        less = [parents[model - {h}] for h in model if h.kind == "effect" and model - {h} in parents]
+        assert all(fit.chi2 < 1.01 * other.chi2 for other in less), model

@@ -143,7 +143,7 @@ class Inference:
 
     @cached_property
     def intervals(self) -> dict[str, Interval]:
-        """Of each parameter of the declared model, about the model in force."""
+        """Of each parameter of the model in force; those of an effect over the models that hold it."""
         fit, intervals = self.exploration.fits[self.in_force], {}
         alone = Expansion(replace(fit, others=()), self.exploration.scale(), self.exploration.library,
                           np.empty((len(fit.residual), 0)))  # fmt: skip
@@ -151,9 +151,9 @@ class Inference:
         sizes = [f.unknown.name for f in self.best.others if not f.unknown.name.startswith(NAMED)]
         constants = [f.unknown.name.removeprefix(NAMED) for f in self.best.others if f.unknown.name.startswith(NAMED)]
         which = f" ({', '.join(constants)})" if 0 < len(constants) <= MOST_CONSTANTS else ""
-        beside = f"{CONSTANTS}{which}" if constants or not sizes else f"size of {sizes[0]}"
-        if self.best.records.data.cover is not None:
-            beside = f"where something unknown acts{f', and {beside}' if self.best.others else ''}"
+        parts = ["where something unknown acts"] if self.posterior.best_is_unknown else []
+        parts += [f"{CONSTANTS}{which}"] if constants else [f"size of {sizes[0]}"] if sizes else []
+        beside = ", and ".join(parts) or (CONSTANTS if self.exploration.library.tolerances else "starts of the records")
         for name, one in self.of_fit(self.in_force).items():
             if name in self.posterior.parameters:
                 causes = tuple(self.posterior.causes(name, float(of_noise[name]), beside))

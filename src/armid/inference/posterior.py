@@ -37,7 +37,10 @@ BENT, MOST_ANSWERS, FOLLOWED = 2.0, 10, 0.2
 
 @dataclass(frozen=True, eq=False)
 class Atom:
-    """Hold one model of the mixture: its hypotheses, their log prior odds, means and deviations of the parameters."""
+    """Hold one model of the mixture: its hypotheses, their log prior odds, means and deviations of the parameters.
+
+    NaN for parameters that the model does not hold.
+    """
 
     log_evidence: float
     log_prior: float
@@ -50,9 +53,9 @@ class Atom:
 class Posterior:
     """Hold the mixture.
 
-    parameters: names of those of the declared model, in the order of the atoms' values. declared: what its own fit says
-    of them, None where nothing is doubted by it. known: deviation of each before the records, as a prior or its box
-    says. temperature: log evidence is divided by it.
+    parameters: names of those of the declared model and of effects, in the order of the atoms' values. declared: what
+    the declared model's own fit says of them, NaN of effects, None where nothing is doubted by it. known: deviation of
+    each before the records, as a prior or its box says. temperature: log evidence is divided by it.
     """
 
     atoms: tuple[Atom, ...]
@@ -84,7 +87,7 @@ class Posterior:
         if self.declared is None:
             return own
         wrong = np.array([any(kind == "unknown" for kind, _ in a.names) for a in self.atoms])
-        moved = np.where(wrong[:, np.newaxis], self.means - self.declared, 0.0)
+        moved = np.where(wrong[:, np.newaxis], np.nan_to_num(self.means - self.declared), 0.0)
         return np.asarray(np.maximum(own, np.minimum(np.sqrt(own**2 + moved**2 / 3.0), self.known)))
 
     @cached_property
@@ -124,15 +127,27 @@ class Posterior:
         return dict(sorted(pairs, key=lambda pair: -pair[1]))
 
     def quantile(self, parameter: str, share: float) -> float:
-        """Return the value below which a share of the mixture lies."""
-        i = self.parameters.index(parameter)
-        means, deviations = self.means[:, i], np.maximum(self.deviations[:, i], 1e-300)
+        """Return the value below which a share of the mixture lies; of an effect, of the models that hold it."""
+        _, weights, means, deviations = self.holding(parameter)
+        deviations = np.maximum(deviations, 1e-300)
         low, high = float((means - 40.0 * deviations).min()), float((means + 40.0 * deviations).max())
         for _ in range(200):
             middle = 0.5 * (low + high)
-            below = float(self.weights @ ndtr((middle - means) / deviations))
+            below = float(weights @ ndtr((middle - means) / deviations))
             low, high = (middle, high) if below < share else (low, middle)
         return 0.5 * (low + high)
+
+    @property
+    def best_is_unknown(self) -> bool:
+        """Whether something unknown acts in the most probable model."""
+        return any(kind == "unknown" for kind, _ in self.atoms[int(np.argmax(self.weights))].names)
+
+    def holding(self, parameter: str) -> tuple[tuple[Atom, ...], Array, Array, Array]:
+        """Return the models that hold a parameter, their weights among themselves, means and deviations."""
+        i = self.parameters.index(parameter)
+        held = np.flatnonzero(np.isfinite(self.means[:, i]))
+        weights = self.weights[held] / max(float(self.weights[held].sum()), 1e-300)
+        return tuple(self.atoms[j] for j in held), weights, self.means[held, i], self.deviations[held, i]
 
     def interval(self, parameter: str) -> tuple[float, float]:
         """Return the interval that holds 95 % of the mixture."""
@@ -143,14 +158,14 @@ class Posterior:
 
         noise: deviation by noise alone, SI. beside: name of the other unknowns of the most probable model.
         """
-        i = self.parameters.index(parameter)
-        first = int(np.argmax(self.weights))
-        best, means, deviations = self.atoms[first], self.means[:, i], self.deviations[:, i]
-        total, own = float(self.weights @ (deviations**2 + (means - self.weights @ means) ** 2)), deviations[first] ** 2
+        atoms, weights, means, deviations = self.holding(parameter)
+        first = int(np.argmax(weights))
+        best = atoms[first]
+        total, own = float(weights @ (deviations**2 + (means - weights @ means) ** 2)), deviations[first] ** 2
         if max(total, own) <= 0.0:
             return []
         away: dict[str, float] = {}
-        for j, (atom, weight) in enumerate(zip(self.atoms, self.weights, strict=True)):
+        for j, (atom, weight) in enumerate(zip(atoms, weights, strict=True)):
             names = sorted(name for _, name in atom.names ^ best.names)
             more = weight * ((means[j] - means[first]) ** 2 + deviations[j] ** 2 - own)
             for name in names:
@@ -167,9 +182,10 @@ class Posterior:
 def posterior(exploration: Exploration) -> Posterior:
     """Return the mixture of all fitted models, and of the hypotheses that were forecast with the expanded ones."""
     library, scale = exploration.library, exploration.scale()
-    own = tuple(n for n in exploration.declared.values if library.owner(n) is None)
     ranked, atoms = exploration.ranked(), []
     top = ranked[0][1]
+    counted = [exploration.fits[model] for model, value in ranked if value >= top + NEGLIGIBLE]
+    own = tuple(dict.fromkeys(n for fit in (exploration.declared, *counted) for n in fit.values))
     # What the best model leaves beyond doubt has a covariance of its own: nobody knows what it is.
     left = UNSEEN if is_certain(exploration.fits[ranked[0][0]]) else frozenset()
     for model, value in ranked:
@@ -181,14 +197,14 @@ def posterior(exploration: Exploration) -> Posterior:
         atoms.append(Atom(value - log_prior(model), log_prior(model), names, mean, np.sqrt(np.diag(covariance))))
         atoms += beside(exploration, model, value, about, own, mean, covariance, top, left)
     fit = exploration.declared
-    known = dict(zip(fit.values, fit.records.span / np.sqrt(12.0), strict=True))
+    known = {n: span / np.sqrt(12.0) for f in (*counted, fit) for n, span in zip(f.values, f.records.span, strict=True)}
     known |= {name: deviation for name, (_, deviation) in library.known.items()}
-    declared, before = (np.array([each[n] for n in own]) for each in (fit.values, known))
+    declared, before = (np.array([each.get(n, np.nan) for n in own]) for each in (fit.values, known))
     return Posterior(tuple(atoms), own, calibration().temperature, declared, before)
 
 
 def of_parameters(about: Expansion, own: Sequence[str]) -> tuple[Array, Array]:
-    """Return the parameters of the declared model at a fit, SI, and their covariance.
+    """Return parameters at a fit, SI, and their covariance; NaN for those that it does not hold.
 
     A strength has no other sign than its box: where the records hardly show it, it and what makes up for it are to one
     side. Mean and covariance are those of the truncated normal distribution.
@@ -207,10 +223,19 @@ def of_parameters(about: Expansion, own: Sequence[str]) -> tuple[Array, Array]:
         answer = covariance[:, i] / deviation**2
         moved += answer * side * (mean - size)
         covariance -= np.outer(answer, answer) * (deviation**2 - left**2)
-    places = [list(fit.values).index(n) for n in own]
-    span = fit.records.span[places]
-    values = np.array([fit.values[n] for n in own]) + span * moved[places]
-    return values, covariance[np.ix_(places, places)] * np.outer(span, span)
+    places, held = places_of(own, fit)
+    span, values, all_values = fit.records.span[places], np.full(len(own), np.nan), np.array(list(fit.values.values()))
+    values[held] = all_values[places] + span * moved[places]
+    squares = np.full((len(own), len(own)), np.nan)
+    squares[np.ix_(held, held)] = covariance[np.ix_(places, places)] * np.outer(span, span)
+    return values, squares
+
+
+def places_of(own: Sequence[str], fit: Fit) -> tuple[list[int], list[int]]:
+    """Return where parameters stand among those of a fit, and which of them it holds."""
+    names = list(fit.values)
+    held = [i for i, n in enumerate(own) if n in fit.values]
+    return [names.index(own[i]) for i in held], held
 
 
 def spread(about: Expansion) -> Array:
@@ -290,7 +315,8 @@ def rises(
         now = np.array([0.5 * (above + below) - middle for (above, below, middle), _ in answered])
         rise = np.where(bends, np.fmin(rise, now), rise)
         bends &= np.isfinite(rise) & (rise > np.where(np.isfinite(before), LEAST_RISE, BENT) * foretold)
-        if not (bends & (before - rise > FOLLOWED * rise)).any():
+        fell = np.where(bends, before, 0.0) - np.where(bends, rise, 0.0)
+        if not (bends & (fell > FOLLOWED * rise)).any():
             break
         steps = np.concatenate([[axes @ answer[:, side] for _, answer in answered] for side in (0, 1)])
         rows = rows + np.nan_to_num(steps)
@@ -331,7 +357,7 @@ def beside(
 ) -> list[Atom]:  # fmt: skip
     """Return the atoms of an expanded model with one hypothesis that was forecast and not fitted, to first order."""
     fit = about.fit
-    places = [list(fit.values).index(n) for n in own]
+    places, held = places_of(own, fit)
     span, atoms = fit.records.span[places], []
     names = frozenset(h.public for h in model) | left
     for ahead in exploration.forecasts.get(model, ()):
@@ -350,8 +376,11 @@ def beside(
                     strength, deviation = truncated(float(strength), float(deviation))
                 moved = -span * answer * strength
                 spread = (span * answer * deviation) ** 2
+            means, squares = mean.copy(), np.diag(covariance).copy()
+            means[held] += moved
+            squares[held] += spread
             atoms.append(Atom(weight - prior + float(ahead.log_factor[i, k]), prior, names | {hypothesis.public},
-                              mean + moved, np.sqrt(np.diag(covariance) + spread)))  # fmt: skip
+                              means, np.sqrt(squares)))  # fmt: skip
     return atoms
 
 

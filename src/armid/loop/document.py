@@ -49,6 +49,8 @@ from armid.report.document import (
     error_table,
     listing,
     made_section,
+    may_be_inputs,
+    noise_text,
     others_text,
     plain,
     records_note,
@@ -203,12 +205,13 @@ def error_sentence(report: Mapping[str, Any]) -> str:
     which, on = ("holdout", "the records held out") if after["holdout"] else ("train", "the train records")
     was, now = rmse_text(before[which], report["unit"]), rmse_text(after[which], report["unit"])
     of_those = report["noise_rms_holdout"] if which == "holdout" else None
-    noise, unit = shown(of_those or report["noise_rms"], report["unit"])
+    unit, output = shown(0.0, report["unit"])[1], next(iter(report["outputs"].values()))
     alone = "" if which == "holdout" else "; no record was held out"
     text, errors = f"{was} before, {now} {unit} RMSE after;", [before[which], after[which]]
     if not report["effects"]:
         text, errors = f"{now} {unit} RMSE,", [after[which]]
-    return f"Error on {on}: {text} the noise is {noise:.3g} {unit}{alone}.{others_text(*errors)}"
+    noise = noise_text(of_those or report["noise_rms"], output, after[which])
+    return f"Error on {on}: {text} {noise}{alone}.{others_text(*errors)}"
 
 
 def step_table(report: Mapping[str, Any]) -> Table:
@@ -240,7 +243,7 @@ def log_table(log: list[Mapping[str, Any]]) -> Table:
 
 def parameter_table(report: Mapping[str, Any]) -> Table:
     before, after = report["parameters"]["before"], report["parameters"]["after"]
-    rows = [(name, value_text(p, struck=True), noise_text(p), trust_text(p),
+    rows = [(name, value_text(p, struck=True), text_of_noise_alone(p), trust_text(p),
              value_text(before[name], struck=True) if name in before else "") for name, p in after.items()]  # fmt: skip
     note = (
         "95 % intervals count all models that were fitted; those of noise alone, which `identify` gives too, take the "
@@ -260,7 +263,7 @@ def trust_text(p: Mapping[str, Any]) -> str:
     return "yes" if p["trusted"] else "not identified" if p["low"] is None else "no"
 
 
-def noise_text(p: Mapping[str, Any]) -> str:
+def text_of_noise_alone(p: Mapping[str, Any]) -> str:
     if p["noise_low"] is None or p["noise_high"] is None:
         return ""
     factor = scale_of(p["unit"], p["value"])[1]
@@ -348,7 +351,7 @@ def models_of(inference: Inference) -> list[dict[str, Any]]:
     for model, _ in inference.exploration.ranked():
         probability = inference.posterior.sets.get(frozenset(h.public for h in model), 0.0)
         if words(model) not in entries and len(entries) < MOST_DRAWN and (probability >= LISTED or not entries):
-            own = {n: i for n, i in inference.of_fit(model).items() if n in inference.posterior.parameters}
+            own = {n: i for n, i in inference.of_fit(model).items() if n in inference.exploration.declared.values}
             values = inference.exploration.fits[model].values
             entries[words(model)] = {
                 "model": words(model), "probability": probability,
@@ -361,7 +364,8 @@ def conclusion(loop: ClosedLoop) -> str:
     """Return the verdict as one sentence."""
     if loop.verdict == IMPLAUSIBLE:
         return f"Nothing is named, as the records look wrong. {loop.next_steps[0]}"
-    of_verdict = {DISAGREES: disagreeing_sentence, CARRIES_NOT: carried_sentence, TOO_ALIKE: doubtful}
+    of_verdict = {DISAGREES: disagreeing_sentence, CARRIES_NOT: carried_sentence, TOO_ALIKE: doubtful,
+                  UNEXPLAINED: unexplained}  # fmt: skip
     if loop.verdict in of_verdict:
         return of_verdict[loop.verdict](loop)
     names = " + ".join(loop.effects)
@@ -369,8 +373,14 @@ def conclusion(loop: ClosedLoop) -> str:
         NO_DISCREPANCY: nothing_missing(loop),
         EXPLAINED: f"The declared model lacked {names}; with it, what remains is noise on {judged_on(loop)}.",
         PARTLY: partly(loop),
-        UNEXPLAINED: "The declared model lacks something that the library does not hold.",
     }[loop.verdict]
+
+
+def unexplained(loop: ClosedLoop) -> str:
+    output, left = next(iter(loop.outputs.values())), loop.after.train.errors.rmse
+    if may_be_inputs(output["noise_rms"], output["moved_by_inputs"], left):
+        return "What remains is more than the noise of the sensors, and noise of the inputs may be all of it."
+    return "The declared model lacks something that the library does not hold."
 
 
 def partly(loop: ClosedLoop) -> str:
@@ -378,8 +388,8 @@ def partly(loop: ClosedLoop) -> str:
     lacks = "something that the library does not hold"
     if unknown < MENTIONED:
         return f"With {names} the declared model does better, but it lacks {lacks}{unclaimed(loop)}"
-    best = "the declared model predicts parts left out of the fit best"
-    return f"The declared model lacks {lacks}. Without it, but with {names}, {best}{unclaimed(loop)}"
+    best = f"Of the models of names alone, that with {names} predicts parts left out of the fit best"
+    return f"The declared model lacks {lacks}. {best}{unclaimed(loop)}"
 
 
 def nothing_missing(loop: ClosedLoop) -> str:
@@ -479,7 +489,7 @@ def diagnosis_sentences(seen: Residuals) -> list[str]:
     said = [f"What remains is more than noise (chance {'below ' if diagnosis.p < LEAST else ''}"
             f"{max(diagnosis.p, LEAST):.2g})."]  # fmt: skip
     if not diagnosis.noise_known:
-        said.append("No rest was recorded, so that the noise is not known: the residual is tested against itself.")
+        said.append("No rest tells the noise: the residual is tested against itself.")
     wholes = {
         "size": "Its mean square is {ratio:.4g} times that of the noise.",
         "repeats": "Repeats of {where} agree with each other {ratio:.3g} times better than with the model (mean "

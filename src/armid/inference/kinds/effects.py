@@ -11,7 +11,16 @@ from armid.inference.decisions import calibration
 from armid.inference.evidence import SCALES, Expansion, Forecast
 from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.library import Library, activation_grid
-from armid.inference.model import ROUGHLY, Fit, candidate_at, fit_from, free_values, responses, unless_diverged
+from armid.inference.model import (
+    ROUGHLY,
+    Fit,
+    candidate_at,
+    fit_from,
+    free_values,
+    responses,
+    start_of,
+    unless_diverged,
+)
 from armid.inference.unknowns import freed, moved, projected
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array
@@ -166,6 +175,7 @@ def refit(
 ) -> Fit | None:  # fmt: skip
     """Return the model with an effect, fitted from the best two of the starts that a forecast gives.
 
+    It can do all that it does without the effect: where it ends worse, the fit begins again there, the effect at rest.
     begun: where its first steps led; the fit goes on from there.
     """
     active = (*fit.active, key)
@@ -176,7 +186,11 @@ def refit(
         best = starts[order[:2]]
     else:
         best = begun[np.newaxis]
-    return fitted(fit, problem, active, list(best), library, about.scale.weight, limit)
+    done = fitted(fit, problem, active, list(best), library, about.scale.weight, limit)
+    if done is not None and done.chi2 <= fit.chi2:
+        return done
+    again = fitted(fit, problem, active, [start_of(problem, fit.values)], library, about.scale.weight, limit)
+    return done if again is None or (done is not None and done.chi2 <= again.chi2) else again
 
 
 def fitted(

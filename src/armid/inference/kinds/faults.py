@@ -25,7 +25,7 @@ from armid.record import Piece, Record
 # Faults whose size is fitted: largest plausible one, in seconds, in shares of the largest signal (a drift per second),
 # as a share, in radians or metres.
 PLAUSIBLE = {"late": 0.05, "clock": 0.02, "offset": 0.05, "drift": 0.1, "gain": 0.1, "start": 0.1}
-# Faults of a sensor, and of the times; all but those of a sensor are of the whole file.
+# Faults of a sensor, and of the times; all but those of a sensor are of the whole file, or of one sensor alone.
 OF_SENSOR, OF_TIMES = ("offset", "drift", "gain"), ("late", "clock")
 # Samples on either side from which one between them is made.
 REACH = 32
@@ -35,10 +35,18 @@ STEP = 1e-3
 
 @dataclass(frozen=True)
 class Fault:
-    """Name what may be wrong in a file: a kind, and of a start or a label the constant of the record that is."""
+    """Name what may be wrong in a file: a kind, and of a start or a label the constant of the record that is.
+
+    alone: whether one sensor of several is late, and not the file.
+    """
 
     kind: str
     constant: str = ""
+    alone: bool = False
+
+    @property
+    def of_sensor(self) -> bool:
+        return self.alone or self.kind in OF_SENSOR
 
     def largest(self, record: Record) -> float:
         of_signal = float(np.abs(record.measured).max()) if self.kind in ("offset", "drift") else 1.0
@@ -50,7 +58,7 @@ class Fault:
 
     def touches(self, output: str, other: str) -> bool:
         """Tell whether a fault of one output of a record is a fault of another too."""
-        return self.kind not in OF_SENSOR or other == output
+        return not self.of_sensor or other == output
 
     def undone(self, record: Record, value: float, plant: Plant, output: str = "") -> Record:
         """Return a record without the fault; output: whose sensor it is, "" for the first."""
@@ -62,7 +70,8 @@ class Fault:
             return undone
         sample = np.arange(record.measured.size)
         beyond = (sample < first) | (sample >= sample.size - last)
-        return undone.with_signals(lambda s: replace(s, guessed=beyond if s.guessed is None else beyond | s.guessed))
+        return undone.with_signals(lambda s: s if not self.touches(own, s.output) else replace(
+            s, guessed=beyond if s.guessed is None else beyond | s.guessed))  # fmt: skip
 
     def lost(self, record: Record, value: float) -> tuple[int, int]:
         """Return how many samples at either end of a record have no measured value once its times are corrected."""
@@ -131,6 +140,8 @@ def faults_of(base: WhiteRecords, index: int) -> Iterator[Fault]:
     """Yield what may be wrong in a record; faults of a whole file belong to its first output."""
     model, record = base.model, base.data.each[index]
     yield from (Fault(kind) for kind in OF_SENSOR)
+    if len(of_file(base, index)) > 1:
+        yield Fault("late", alone=True)
     if index != of_file(base, index)[0]:
         return
     yield from (Fault(kind) for kind in OF_TIMES)
@@ -204,6 +215,9 @@ def delayed(base: WhiteRecords, index: int, z: Array, fault: Fault) -> list[Arra
     changes = []
     for i, simulated in zip(of_file(base, index), simulated_file(base, index, z), strict=True):
         replay, record = base.replays[i], base.data.each[i]
+        if not fault.touches(base.data.each[index].output, record.output):
+            changes.append(np.zeros(record.n_samples))
+            continue
         step = record.manoeuvre.interval
         samples = np.concatenate([p.start_index + np.arange(p.manoeuvre.n_samples)[own]
                                   for p, own in zip(replay.pieces, replay.record.samples, strict=True)])  # fmt: skip
@@ -273,7 +287,7 @@ def hypotheses(records: WhiteRecords) -> list[Hypothesis]:
     for index, record in enumerate(records.data.each):
         for fault in faults_of(records, index):
             largest = 1.0 if fault.kind == "label" else fault.largest(record)
-            place = f"{record.file}:{record.output}" if fault.kind in ("offset", "drift", "gain") else record.file
+            place = f"{record.file}:{record.output}" if fault.of_sensor else record.file
             name = f"{fault.kind}{'_' if fault.constant else ''}{fault.constant}@{place}"
             faults.append((name, OfRecord(index, fault, largest)))
     return [
