@@ -390,13 +390,15 @@ def test_records_that_look_wrong_are_told_and_nothing_is_looked_for(axis, monkey
     assert conclusion(found) == "Nothing is named, as the records look wrong. The drive has the other sign."
 
 
-def concluded(verdict, effects=(), claimed=(), alternatives=(), unknown=0.1):
+def concluded(verdict, effects=(), claimed=(), alternatives=(), unknown=0.1, moved=0.0):
     """Return what is said first of a loop that ended with a verdict and left more than noise."""
     steps = [
         SimpleNamespace(effect=e, claimed=e in claimed, alternatives=alternatives, probability=0.6) for e in effects
     ]
     return conclusion(SimpleNamespace(
-        verdict=verdict, effects=effects, steps=steps, after=SimpleNamespace(significant=True),
+        verdict=verdict, effects=effects, steps=steps,
+        outputs={"speed": {"noise_rms": 0.1, "moved_by_inputs": moved}},
+        after=SimpleNamespace(significant=True, train=SimpleNamespace(errors=SimpleNamespace(rmse=0.45))),
         campaign=SimpleNamespace(holdout=()),
         inference=SimpleNamespace(posterior=SimpleNamespace(probability=lambda _: unknown)),
     ))  # fmt: skip
@@ -410,8 +412,9 @@ def test_a_conclusion_is_what_the_tests_say():
     assert concluded("partly_explained", ("a", "b"), "a").endswith("does not hold: b is not claimed.")
     assert concluded("partly_explained", ("a", "b"), "ab").endswith("does not hold.")
     predicts = concluded("partly_explained", ("a", "b"), unknown=0.9)
-    assert predicts.endswith("but with a + b, the declared model predicts parts left out of the fit best: no name is "
-                             "claimed.")  # fmt: skip
+    assert predicts.endswith("that with a + b predicts parts left out of the fit best: no name is claimed.")
+    assert concluded("unexplained") == "The declared model lacks something that the library does not hold."
+    assert concluded("unexplained", moved=0.4).endswith("noise of the inputs may be all of it.")
     group = concluded("cannot_tell_apart", ("a", "b"), "a", ("c", "d"))
     assert group.startswith("With a + b a significant discrepancy remains, and on these records")
     assert "b cannot be told from c or d" in group

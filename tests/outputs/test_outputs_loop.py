@@ -96,20 +96,22 @@ def test_where_nothing_is_missing_no_sensor_is_accused(sound) -> None:
         assert abs(TRUTH[e.name] - e.value) < 1.5 * (e.high - e.low) / 2.0
 
 
-def closed_with(campaign, file, kind, value):
-    """Close the loop on a drive with a fault of its sensor of the load, or of the times of a file."""
-    records = tuple(trimmed(Fault(kind), r, -value, campaign.plant, "load_angle") if r.file == file else r
+def closed_with(campaign, file, kind, value, alone=False):
+    """Close the loop on a drive with a fault of its sensor of the load, or of the times of a file or a sensor alone."""
+    records = tuple(trimmed(Fault(kind, alone=alone), r, -value, campaign.plant, "load_angle") if r.file == file else r
                     for r in campaign.records)  # fmt: skip
     return close_loop(campaign.model(), replace(campaign, records=records), {"coulomb": EFFECTS["coulomb"]})
 
 
-@pytest.mark.parametrize(("file", "kind", "value"), [("a.csv", "gain", 0.03), ("b.csv", "late", 0.012)])
-def test_a_fault_of_one_sensor_or_of_a_file_is_told(sound, file, kind, value) -> None:
+@pytest.mark.parametrize(("file", "kind", "value", "alone"), [
+    ("a.csv", "gain", 0.03, False), ("b.csv", "late", 0.012, False), ("a.csv", "late", 0.015, True),
+])  # fmt: skip
+def test_a_fault_of_one_sensor_or_of_a_file_is_told(sound, file, kind, value, alone) -> None:
     """Of several outputs one sensor is at fault, or the times of all; starts are fitted meanwhile."""
-    found = closed_with(sound, file, kind, value)
+    found = closed_with(sound, file, kind, value, alone)
     (suspect,) = found.suspects
     assert (suspect.record, suspect.kind) == (file, kind)
-    assert suspect.output == ("" if kind == "late" else "load_angle")
+    assert suspect.output == ("" if kind == "late" and not alone else "load_angle")
     shown = value / (1.0 - value) if kind == "gain" else value
     assert suspect.low < shown < suspect.high
     assert found.effects == ()

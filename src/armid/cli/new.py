@@ -21,7 +21,7 @@ from armid.errors import ArmidError, nearest, quoted
 from armid.model import Array
 from armid.model.effect import RESERVED
 from armid.model.parameter import check_name
-from armid.record.sensor import FEWEST_REST_SAMPLES, sensor_of
+from armid.record.sensor import FEWEST_REST_SAMPLES, sensor_of, stands_still
 from armid.record.signal import wraps_at
 from armid.record.table import CsvTable, read_table
 from armid.registry import load_registry
@@ -223,8 +223,8 @@ HEADERS = {
 DRIVEN_IN = {"mV": ("V", 1e-3), "kV": ("V", 1e3), "mA": ("A", 1e-3), "kN": ("N", 1e3), "mN m": ("N_m", 1e-3),
              "mNm": ("N_m", 1e-3), "kNm": ("N_m", 1e3), "kN m": ("N_m", 1e3)}  # fmt: skip
 LINEAR, DRIVES = {"m", "mm", "m_s", "mm_s", "N"}, {"V", "A", "N", "N_m"}
-# A machine is at rest as long as its signal stays within this share of its range.
-AT_REST = 0.01
+# A machine is at rest as long as its signal stays within so many deviations of that of its first rows.
+BEYOND_REST = 5.0
 # Share of equal neighbours from which on an input keeps its value between samples.
 KEPT = 0.5
 
@@ -423,9 +423,13 @@ def about(columns: Mapping[str, Array], renamed: Mapping[str, str]) -> str:
     measured = next(h for h in renamed.values() if not h.startswith(("drive_", "current_")))
     values = columns[measured]
     present = np.flatnonzero(np.isfinite(values))
-    moved = np.flatnonzero(np.abs(values[present] - values[present[0]]) > AT_REST * np.ptp(values[present]))
-    n_rest = int(present[moved[0]]) if moved.size else 0
-    rest = f"{times[n_rest] - times[0]:.3g} s of rest first" if n_rest >= FEWEST_REST_SAMPLES else "no rest first"
+    first = values[present[:FEWEST_REST_SAMPLES]]
+    moved = np.flatnonzero(
+        np.abs(values[present] - np.median(first)) > BEYOND_REST * max(np.std(first), np.ptp(first) / 2.0)
+    )
+    n_rest = int(present[moved[0]]) if moved.size and stands_still(first, 0.0, False) else 0
+    shorter = f"fewer than {FEWEST_REST_SAMPLES} rows of rest first"
+    rest = f"{times[n_rest] - times[0]:.3g} s of rest first" if n_rest >= FEWEST_REST_SAMPLES else shorter
     sensor = sensor_of(values[present])
     step = f"steps of {sensor.step:.3g}" if sensor.step else "a fine sensor"
     hold = f", renewed every {sensor.hold} rows" if sensor.hold > 1 else ""

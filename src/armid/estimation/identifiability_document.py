@@ -31,6 +31,7 @@ from armid.report.style import GREY, OKABE_ITO, look, pyplot
 from armid.units import scale_of, shown
 
 PACKAGES = ("armid", "numpy", "scipy", "numba")
+UNDETERMINED = "not determined"
 MOST_OFFERS, MOST_COLUMNS, MOST_NAMED = 8, 5, 6
 # The point that was given is away from the minimum when a step there is more standard deviations than this.
 AWAY = 1.0
@@ -76,13 +77,16 @@ def identifiability_document(
 
 def answer_and_remarks(result: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return which parameters are bounded, which move together and the best offer; and the other remarks."""
-    bounded, unbounded = [], []
+    bounded, by_others, unbounded = [], [], []
     for name, p in result["parameters"].items():
+        deviation = deviation_text(name, p, p["deviation"])
         if p["profile"]["bounded_low"] and p["profile"]["bounded_high"]:
-            bounded.append(f"{name} ({deviation_text(name, p, p['deviation'])})")
+            (by_others if deviation == UNDETERMINED else bounded).append(f"{name} ({deviation})")
         else:
             unbounded.append(name)
     said = [f"Bounded on both sides at 95 %, with this standard deviation: {', '.join(bounded)}."] if bounded else []
+    names = ", ".join(name.partition(" ")[0] for name in by_others)
+    said += [f"Bounded by the limits of other parameters alone: {names}."] if by_others else []
     said += [f"Not bounded on both sides: {', '.join(unbounded)}."] if unbounded else []
     n = len(result["groups"])
     *others, best = result["remarks"][n:]
@@ -93,7 +97,7 @@ def parameter_table(result: Mapping[str, Any]) -> Table:
     rows = []
     for name, p in result["parameters"].items():
         unit, factor = scale_of(p["unit"], p["value"])
-        curved = "not determined" if p["low"] is None else interval_text(factor * p["low"], factor * p["high"])
+        curved = UNDETERMINED if p["low"] is None else interval_text(factor * p["low"], factor * p["high"])
         profile = p["profile"]
         bounded = {(True, True): "", (True, False): "not above", (False, True): "not below"}.get(
             (profile["bounded_low"], profile["bounded_high"]), "NOT BOUNDED")  # fmt: skip
@@ -121,7 +125,7 @@ def profile_text(profile: Mapping[str, Any], factor: float) -> str:
 def deviation_text(name: str, p: Mapping[str, Any], deviation: float | None) -> str:
     """Return a standard deviation in percent of a value, of an addition in its unit; p: stored parameter."""
     if deviation is None or not np.isfinite(deviation):
-        return "not determined"
+        return UNDETERMINED
     if "." not in name and abs(p["value"]) > 1e-3 * (p["bound_high"] - p["bound_low"]):
         return f"{100 * deviation / abs(p['value']):.2g} %"
     return "{:.2g} {}".format(*shown(deviation, p["unit"])).removesuffix(" 1")
@@ -235,8 +239,17 @@ def remarks(examination: Examination) -> list[str]:
         said.append(f"The tolerances of the constants counted, the deviations are: {', '.join(deviations)}.")
     said += point_remarks(examination) + level_remarks(examination)
     if examination.offers:
-        return [*said, f"One more record, {offer_text(examination, examination.offers[0])}."]
+        return [*said, offer_sentence(examination, examination.offers[0])]
     return [*said, "No further manoeuvre was found that the machine could make."]
+
+
+def offer_sentence(examination: Examination, offer: Offer) -> str:
+    name = examination.space.free_names[offer.best]
+    text = offer_text(examination, offer)
+    if text.endswith(f"to {UNDETERMINED}"):
+        return (f"No further record that this machine can make determines {name}: fix it, or one of those that move "
+                "with it.")  # fmt: skip
+    return f"One more record, {text}."
 
 
 def group_remark(examination: Examination, group: Group) -> str:

@@ -17,6 +17,7 @@ from armid.errors import ArmidError, quoted
 from armid.estimation.bootstrap import Refined, Scatter, bootstrap, without
 from armid.estimation.corrections import DataIssue
 from armid.estimation.information import Information, collinear, information_at
+from armid.estimation.input_noise import moved_by_inputs
 from armid.estimation.least_squares import held_by_bound, refine, with_fitted_starts
 from armid.estimation.noise_model import MISFIT, level_of
 from armid.identifiers import Identifier, run
@@ -422,11 +423,13 @@ def output_errors(replays: Sequence[Replay], candidate: Array) -> Errors:
     )
 
 
-def outputs_entry(replays: Sequence[Replay]) -> dict[str, dict[str, Any]]:
-    """Return output -> its unit and its noise, the mean over records, in the order of the plant, for JSON."""
+def outputs_entry(replays: Sequence[Replay], candidate: Array) -> dict[str, dict[str, Any]]:
+    """Return output -> its unit, its noise (the mean over records) and how far that of inputs moves it, for JSON."""
     levels = [(o, [r.record.noise.rms for r in replays if r.place == i])
               for i, o in enumerate(replays[0].model.plant.outputs)]  # fmt: skip
-    return {o.name: {"unit": o.unit, "noise_rms": float(np.mean(rms))} for o, rms in levels if rms}
+    moved = moved_by_inputs(replays, candidate)
+    return {o.name: {"unit": o.unit, "noise_rms": float(np.mean(rms)), "moved_by_inputs": moved.get(o.name, 0.0)}
+            for o, rms in levels if rms}  # fmt: skip
 
 
 def errors_by_file(replays: Sequence[Replay], candidate: Array) -> dict[str, JointErrors]:

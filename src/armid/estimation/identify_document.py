@@ -27,6 +27,7 @@ from armid.report.document import (
     error_table,
     listing,
     made_section,
+    noise_text,
     others_text,
     plain,
     records_note,
@@ -94,16 +95,17 @@ def identify_document(
 def answer(result: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, ...]:
     free = {name: p for name, p in result["parameters"].items() if p["bound_low"] is not None}
     begins = lead(free, result["error"]["holdout"] is not None)
-    first = f"{begins}: {'; '.join(f'{name} = {value_text(p)}' for name, p in free.items())}."
+    lost = [name for name, p in free.items() if p["low"] is None and p.get("interval_by") != "bootstrap"]
+    found = [name for name in free if name not in lost or len(lost) == len(free)]
+    first = f"{begins}: {'; '.join(f'{name} = {value_text(free[name])}' for name in found)}."
     train, holdout = result["error"]["train"], result["error"]["holdout"]
     out = "no record was held out, so that nothing judges the model"
     if holdout is not None:
         out = f"{rmse_text(holdout, result['unit'])} on those held out"
-    noise, unit = shown(next(iter(result["outputs"].values()))["noise_rms"], result["unit"])
+    output, unit = next(iter(result["outputs"].values())), shown(0.0, result["unit"])[1]
     second = (f"Error (RMSE): {rmse_text(train, result['unit'])} {unit} on the records fitted, {out}; "
-              f"the noise is {noise:.3g} {unit}.{others_text(train, holdout)}")  # fmt: skip
+              f"{noise_text(output['noise_rms'], output, train)}.{others_text(train, holdout)}")  # fmt: skip
     held = [name for name, p in free.items() if p["bound_active"]]
-    lost = [name for name, p in free.items() if p["low"] is None and p.get("interval_by") != "bootstrap"]
     doubts = [f"Held by a bound, and not to be trusted: {', '.join(held)}."] if held else []
     doubts += [f"Not determined by these records: {', '.join(lost)}."] if lost else []
     doubts += details["warnings"]
@@ -198,7 +200,7 @@ def result_of(identification: Identification) -> dict[str, Any]:
         "stopped": identification.stopped,
         "seed": identification.seed,
         "noise": noises,
-        "outputs": outputs_entry(replays),
+        "outputs": outputs_entry(replays, identification.candidate),
         "engine_error": max(r.engine_error_at(identification.candidate) for r in identification.train_replays),
         "model": str(identification.model),
         "versions": versions_of(PACKAGES),
@@ -323,8 +325,9 @@ def misfit_remarks(identification: Identification) -> list[str]:
     why = "the model, in which nothing is free, lacks something."
     if identification.space.free.any():
         why = (
-            "the model lacks something, or the search has not come to the minimum; the intervals are widened to the "
-            "residual and its correlation in time, and hold only as far as what is lacking averages out."
+            "the model lacks something, an input is noisy, or the search has not come to the minimum; the intervals "
+            "are widened to the residual and its correlation in time, and hold only as far as what is lacking averages "
+            "out."
         )
     return [f"The residual is this many times the noise: {text}{more}: {why}"]
 

@@ -10,6 +10,7 @@ import numpy as np
 from armid.estimation.advice import Advice
 from armid.estimation.identify import JointErrors, errors_by_file, record_errors
 from armid.estimation.information import NORMAL_95
+from armid.estimation.input_noise import moved_by_inputs
 from armid.estimation.least_squares import held_by_bound
 from armid.inference.carry_over import Missed, least_noise, missed_records
 from armid.inference.checks import Diagnosis, Residuals
@@ -18,7 +19,7 @@ from armid.inference.evidence import expansion_of
 from armid.inference.hypothesis import Hypotheses, Hypothesis, words
 from armid.inference.infer import Inference
 from armid.inference.kinds.drifts import LARGEST, OfParameter
-from armid.inference.kinds.faults import OF_SENSOR, OfRecord
+from armid.inference.kinds.faults import OfRecord
 from armid.inference.library import Library
 from armid.inference.missing_signal import Missing
 from armid.inference.model import Fit
@@ -220,13 +221,15 @@ class ClosedLoop(Result):
         """The declared model with the effects."""
         return self.after.model
 
-    @property
+    @cached_property
     def outputs(self) -> dict[str, dict[str, Any]]:
-        """Output -> its unit and the noise of its train records."""
+        """Output -> its unit, the noise of its train records, and how far noise of their inputs moves the model."""
         train = self.before.train
         pairs = [(r.place, level.rms) for r, level in zip(train.replays, train.data.levels, strict=True)]
         levels = [(o, [rms for place, rms in pairs if place == i]) for i, o in enumerate(self.campaign.plant.outputs)]
-        return {o.name: {"unit": o.unit, "noise_rms": float(np.mean(rms))} for o, rms in levels if rms}
+        moved = moved_by_inputs(train.replays, self.after.train.candidate)
+        return {o.name: {"unit": o.unit, "noise_rms": float(np.mean(rms)), "moved_by_inputs": moved.get(o.name, 0.0)}
+                for o, rms in levels if rms}  # fmt: skip
 
     @property
     def noise_rms(self) -> float:
@@ -285,7 +288,7 @@ def shown_ends(low: float, high: float) -> tuple[float | None, float | None]:
 
 def words_of(cause: str) -> str:
     """Return a cause of an interval's width in words."""
-    return cause if " " in cause or cause == "noise" else f"{cause}, which these records cannot show"
+    return cause if " " in cause or cause == "noise" else f"whether {cause} acts"
 
 
 def report_of(loop: ClosedLoop) -> dict[str, Any]:
@@ -408,7 +411,7 @@ def fault_of(what: OfRecord, name: str, fit: Fit, inference: Inference) -> Recor
         constant = record.constants[fault.constant]
         return RecordFault(record.file, record.role, "label", FREED, 1.0 - constant, fault.unit(record, plant))
     value, half = size_of(name, fit, inference)
-    output = record.output if fault.kind in OF_SENSOR and len(plant.outputs) > 1 else ""
+    output = record.output if fault.of_sensor and len(plant.outputs) > 1 else ""
     low, high = what.largest * (value - half), what.largest * (value + half)
     unit = fault.unit(record, plant)
     return RecordFault(
@@ -468,7 +471,8 @@ def fault_sentence(s: RecordFault) -> str:
     if s.kind == "late":
         word = "late" if s.value > 0.0 else "early"
         low, high = along(s.value, 1e3 * s.low, 1e3 * s.high)
-        return f"{s.record}: starts {1e3 * abs(s.value):.3g} ms {word} ({low:.3g} to {high:.3g}); corrected."
+        where = f"{s.record}, {s.output}: its sensor is" if s.output else f"{s.record}: starts"
+        return f"{where} {1e3 * abs(s.value):.3g} ms {word} ({low:.3g} to {high:.3g}); corrected."
     words = {"start": "starts elsewhere than declared, by", "offset": "its sensor is off by",
              "gain": "its gain is off by", "drift": "its sensor drifts by",
              "clock": "its clock is fast by a share of"}[s.kind]  # fmt: skip

@@ -12,6 +12,7 @@ from armid.model import Array, Manoeuvre, ManoeuvreKey, Plant
 from armid.record.record import Piece, Record, Signal
 from armid.record.resample import Timing, onto_grid, piece_length, timing_of, with_window
 from armid.record.schema import CampaignSheet, KindError, RecordSheet, number
+from armid.record.sensor import InputNoise, noise_of_input
 from armid.record.signal import signal_of
 from armid.record.start import Track, n_spent, state_at, state_shown, track_of
 from armid.record.table import (
@@ -66,6 +67,7 @@ def record_of(table: CsvTable, sheet: RecordSheet, campaign: CampaignSheet, plan
         repeat_of=sheet.repeat_of or "",
         restart_s=sheet.restart_s,
         irregularity=timing.irregularity,
+        input_noise=input_noises(plant, table, sources, measured),
     )
     tracks = {} if plant.from_rest else tracks_of(record, plant, table, lambda *what: read(*what)[0])
     return with_window(started(record, plant, tracks, where), sheet.window_s, where)
@@ -90,6 +92,19 @@ def manoeuvre_of(
             values = table.numbers(header) * input_factor(header, driven.unit, table)
             inputs[driven.name] = onto_grid(values, table.columns[TIME], timing, driven.hold or hold)
     return Manoeuvre(timing.interval, timing.n_samples, constants, inputs, hold, timing.start)
+
+
+def input_noises(
+    plant: Plant, table: CsvTable, sources: Mapping[str, str], measured: Sequence[tuple[Signal, Array]]
+) -> dict[str, InputNoise]:  # fmt: skip
+    """Return the noise of each input that was measured with some, SI; sources: input -> header of its column."""
+    outputs, noises = [(values, signal.unit in ("rad/s", "m/s")) for signal, values in measured], {}
+    for driven in plant.inputs:
+        header = sources.get(driven.name)
+        if header is not None:
+            factor = input_factor(header, driven.unit, table)
+            noises[driven.name] = noise_of_input(table.numbers(header) * factor, outputs)
+    return {name: noise for name, noise in noises.items() if noise != InputNoise()}
 
 
 def input_factor(header: str, unit: str, table: CsvTable) -> float:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.model import Array, Manoeuvre, Output
-from armid.record.sensor import Broken, Mask, Noise, Sensor
+from armid.record.sensor import Broken, InputNoise, Mask, Noise, Sensor
 
 NOISE_FREE = 1e-6
 # Source of a noise that nothing has to be learnt from.
@@ -153,7 +153,8 @@ class Record:
     and `each` holds a record for each. pieces: cut to the window; one piece unless `restart_s` was given. whole_pieces:
     the same before the window. earliest: first sample that may be in a window. columns: header -> the file's other
     columns on the grid, in the unit of the header. repeat_of: file of the record whose manoeuvre this one repeats, or
-    "". irregularity: None where the file's times were even.
+    "". irregularity: None where the file's times were even. input_noise: measured input -> its noise, SI; without
+    those that are exact.
     """
 
     file: str
@@ -167,6 +168,7 @@ class Record:
     repeat_of: str = ""
     restart_s: float | None = None
     irregularity: Irregularity | None = None
+    input_noise: Mapping[str, InputNoise] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return (f"<Record {self.file} ({self.role}): {len(self.measured)} samples of {self.manoeuvre.interval:g} s, "

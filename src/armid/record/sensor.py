@@ -7,7 +7,7 @@ two rows makes values that no sensor gave.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import comb, log1p
+from math import ceil, comb, log1p
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,6 +146,9 @@ GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 # Neighbours may correlate as the noise of a filtered sensor does: up to the longest memory, from so many standard
 # errors (about 2/sqrt(n)) on.
 MEMORIES, DISTINCT, LONGEST_MEMORY = np.linspace(-0.5, 0.95, 146), 3.0, 0.8
+# By how much a longer rest of an input is tried. A measured input passes so many steps, and changes in such a share of
+# the samples.
+LONGER_REST, FEWEST_STEPS, CHANGING = 1.25, 16, 0.1
 # Independent samples of a rest that tell its noise.
 FEWEST_INDEPENDENT = 12.0
 # Values farther out than this many standard deviations are no noise.
@@ -177,6 +180,52 @@ def noise_of(rest: Array, motion: Array, interval: float, times: Array | None = 
     # an exponential correlation rho_k = phi^k sums to phi/(1 - phi) = total, and phi = exp(-interval/time constant)
     time_constant = interval / log1p(1 / total) if total > 0 else 0.0
     return Noise(max(rms, floor), mean, time_constant, 1 / (1 + 2 * total), rest.size, "rest")
+
+
+@dataclass(frozen=True)
+class InputNoise:
+    """Hold how far a measured input may be from what drove the machine [unit of the input].
+
+    rms: of white noise with the density that a rest shows at low frequencies. step: of the sensor's rounding, 0 for a
+    fine one.
+    """
+
+    rms: float = 0.0
+    step: float = 0.0
+
+    def drawn(self, values: Array, rng: np.random.Generator) -> Array:
+        """Return errors of values, (n_samples,): a rounding stays while the value stays."""
+        runs = np.cumsum(np.diff(values, prepend=values[:1]) != 0.0)
+        rounding = self.step * (rng.random(int(runs[-1]) + 1) - 0.5)
+        return np.asarray(self.rms * rng.standard_normal(values.size) + rounding[runs])
+
+
+def noise_of_input(values: Array, outputs: Sequence[tuple[Array, bool]]) -> InputNoise:
+    """Return the noise of an input, 0 for a command, which is known exactly.
+
+    A command has a few values only. Else it is that at the beginning of the file while the machine stands still; of
+    several lengths of this rest the quietest counts, as the drive may begin before the machine moves.
+    values: (n_rows,). outputs: columns of the machine's motion, (n_rows,) each, and whether each is a speed.
+    """
+    seen, n = list[float](), FEWEST_REST_SAMPLES
+    if np.unique(values).size < FEWEST_STEPS:
+        return InputNoise()
+    rests = [(values, 0.0, False), *((y, float(np.nanmax(np.abs(y))), is_speed) for y, is_speed in outputs)]
+    while n <= values.size and all(stands_still(x[:n], size, is_speed) for x, size, is_speed in rests):
+        deviations = values[:n] - np.mean(values[:n])
+        # of equal values the mean can miss the value by its last digit
+        is_equal = np.ptp(values[:n]) == 0.0
+        seen.append(0.0 if is_equal else float(np.std(deviations)) * np.sqrt(1.0 + 2.0 * correlation_sum(deviations)))
+        n = ceil(LONGER_REST * n)
+    return InputNoise(float(min(seen, default=0.0)), rounding_of_input(values))
+
+
+def rounding_of_input(values: Array) -> float:
+    """Return the step with which a sensor rounds an input, 0 for a fine one and for a command.
+
+    A command stays, or jumps; what is measured passes one step after the other, or changes with each sample.
+    """
+    return step_of(values) if np.mean(np.diff(values) != 0.0) >= CHANGING else 0.0
 
 
 def rest_between(values: Array, still: Mask, is_speed: bool) -> Array:

@@ -265,6 +265,8 @@ def unlike(names: list[str]) -> list[str]:
 
 # Curves of more records than this would make a page that nobody scrolls through.
 MOST_RECORDS = 24
+# What is left of a model and is below this many times what noise of sensor and inputs does may be that alone.
+NO_MORE = 1.5
 ERROR_NOTE = (
     "RMSE: pooled over all samples. NRMSE: each record divided by its rms. chi2/sample: mean of (residual/noise)^2, 1 "
     "where only noise is left. S, S1, S2: similarity degrees of the paper (whole, numbers, shape), mean by duration; "
@@ -362,6 +364,24 @@ def others_text(*errors: Mapping[str, Any] | None) -> str:
             if e is not first:
                 said.setdefault(name, []).append(f"{rmse_text(e, e['unit'])} {scale_of(e['unit'])[0]}")
     return "".join(f" {name}: {' and '.join(texts)}." for name, texts in said.items())
+
+
+def noise_text(noise: float, output: Mapping[str, Any], error: Mapping[str, Any]) -> str:
+    """Return the noise of an output, what noise of the inputs does to it, and whether that may be all that is left.
+
+    noise: [unit]. output: its entry of "outputs". error: of the model on the records that are spoken of.
+    """
+    value, unit = shown(noise, output["unit"])
+    text, moved = f"the noise is {value:.3g} {unit}", output["moved_by_inputs"]
+    if moved < noise:
+        return text
+    text += f"; that of the inputs moves the model by {shown(moved, output['unit'])[0]:.3g} {unit}"
+    return text + (", and what remains may be that alone" if may_be_inputs(noise, moved, error["rmse"]) else "")
+
+
+def may_be_inputs(noise: float, moved: float, left: float | None) -> bool:
+    """Tell whether what is left of a model, an RMSE, may be what noise of the inputs does to it."""
+    return left is not None and moved >= noise and noise < left < NO_MORE * float(np.hypot(noise, moved))
 
 
 def rmse_text(error: Mapping[str, Any], unit: str) -> str:

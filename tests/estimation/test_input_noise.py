@@ -1,0 +1,112 @@
+"""Noise of measured inputs: what a column shows of it, how far it moves the model, and what is said of it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from armid import identify, read_campaign
+from armid.estimation.identify_document import answer, details_of, result_of
+from armid.estimation.input_noise import moved_by_inputs, pooled_noise
+from armid.record import write_campaign
+from armid.record.sensor import InputNoise, noise_of_input
+
+INERTIA, DAMPING, INTERVAL, SPEED_NOISE, TORQUE_NOISE = 0.05, 0.03, 0.01, 0.005, 0.02
+TIMES = INTERVAL * np.arange(1200)
+
+
+def torque(seed):
+    rng = np.random.default_rng(seed)
+    waves = zip(rng.uniform(0.05, 0.15, 3), rng.uniform(0.1, 1.0, 3), rng.uniform(0.0, 6.0, 3), strict=True)
+    return np.clip((TIMES - 0.6) / 0.5, 0.0, 1.0) * sum(a * np.sin(2.0 * np.pi * f * TIMES + p) for a, f, p in waves)
+
+
+def speed(drive):
+    """Exact over each interval in which the torque stays."""
+    kept = np.exp(-DAMPING * INTERVAL / INERTIA)
+    moved = [0.0]
+    for u in drive[:-1]:
+        moved.append(kept * moved[-1] + (1.0 - kept) * u / DAMPING)
+    return np.array(moved)
+
+
+def campaign(folder, measured):
+    tables, rng = {}, np.random.default_rng(5)
+    for i in range(3):
+        drive = torque(i)
+        tables[f"r{i}.csv"] = {
+            "time_s": TIMES,
+            "drive_N_m": measured(drive, rng),
+            "angular_velocity_rad_s": speed(drive) + rng.normal(0.0, SPEED_NOISE, len(TIMES)),
+        }
+    entries = (
+        f'[[records]]\nfile = "{name}"\nrole = "{"holdout" if name == "r2.csv" else "train"}"\n' for name in tables
+    )
+    head = 'name = "axis"\nplant = "rotary_arm"\nhold = "zero"\n'
+    fixed = "[parameters.gain]\nfixed = 1.0\n[parameters.gravity_moment]\nfixed = 0.0\n"
+    return read_campaign(write_campaign(folder, head + "".join(entries) + fixed, tables))
+
+
+def exact(drive, rng):
+    return drive
+
+
+def noisy(drive, rng):
+    return drive + rng.normal(0.0, TORQUE_NOISE, len(drive))
+
+
+def rounded(drive, rng):
+    return 0.01 * np.round(drive / 0.01)
+
+
+@pytest.mark.parametrize(
+    ("measured", "rms", "step"), [(exact, 0.0, 0.0), (noisy, TORQUE_NOISE, 0.0), (rounded, 0.0, 0.01)]
+)
+def test_what_a_column_shows(tmp_path, measured, rms, step):
+    noise = pooled_noise(campaign(tmp_path / "axis", measured).train)
+    if measured is exact:
+        assert noise == {}
+    else:
+        (found,) = noise.values()
+        assert found.rms == pytest.approx(rms, rel=0.25, abs=1e-9)
+        assert found.step == pytest.approx(step, rel=1e-6, abs=1e-4)
+
+
+@pytest.mark.parametrize("command", [
+    np.repeat(np.random.default_rng(1).choice([-1.0, 1.0], 400), 3),
+    np.repeat(np.linspace(-12.0, 12.0, 25), 40),
+    np.sin(TIMES) * (TIMES > 0.5),
+], ids=["pseudo-random", "staircase", "sine"])  # fmt: skip
+def test_a_command_is_known_exactly(command):
+    still = np.random.default_rng(2).normal(0.0, 0.01, len(command))
+    assert noise_of_input(command, [(still, True)]) == InputNoise()
+
+
+def test_how_far_it_moves_the_model(tmp_path):
+    """A torque with noise turns a disc as a random walk with damping, whose variance is known."""
+    declared = campaign(tmp_path / "axis", noisy)
+    fit = identify(declared)
+    kept = np.exp(-DAMPING * INTERVAL / INERTIA)
+    kicks = ((1.0 - kept) / DAMPING) ** 2 * pooled_noise(declared.train)["u"].rms ** 2
+    walk = kicks * np.cumsum(np.append(0.0, kept ** (2.0 * np.arange(len(TIMES) - 1))))
+    moved = moved_by_inputs(fit.train_replays, fit.candidate)
+    (rms,) = moved.values()
+    assert rms == pytest.approx(np.sqrt(np.mean(walk)), rel=0.25)
+
+
+def test_it_is_said_that_this_may_be_all_that_remains(tmp_path):
+    fit = identify(campaign(tmp_path / "axis", noisy))
+    said = " ".join(answer(result_of(fit), details_of(fit)))
+    assert "that of the inputs moves the model by" in said
+    assert "what remains may be that alone" in said
+    without = identify(campaign(tmp_path / "exact", exact))
+    assert "inputs" not in " ".join(answer(result_of(without), details_of(without)))
+
+
+def test_drawn_errors_stay_while_a_rounded_value_stays():
+    values = np.repeat([0.0, 0.01, 0.02], 50)
+    errors = InputNoise(step=0.01).drawn(values, np.random.default_rng(0))
+    assert len(np.unique(errors)) == 3
+    assert np.abs(errors).max() <= 0.005
+    white = replace(InputNoise(step=0.01), rms=1.0).drawn(np.zeros(4000), np.random.default_rng(0))
+    assert np.std(white) == pytest.approx(1.0, rel=0.05)
