@@ -83,6 +83,9 @@ def test_a_list_is_a_table_and_a_name_says_more(run, refused):
         assert json.loads(run("list", what, names[-1], "--json").out)[what].keys() == {names[-1]}
     assert "port torque\n" in run("list", "effects", "coulomb").out
     assert "port torque += -level" in run("list", "effects", "coulomb", "viscous", "--long").out
+    delayed = run("list", "effects", "drive_delay", "--long").out
+    assert "port winding += late - voltage" in delayed
+    assert "port drive += late - drive_effort" in delayed
     assert "did you mean 'coulomb'" in refused("list", "effects", "colomb")
 
 

@@ -3,6 +3,7 @@
 import textwrap
 from collections.abc import Callable, Sequence
 from functools import partial
+from inspect import signature
 from shutil import get_terminal_size
 from typing import Any
 
@@ -144,11 +145,15 @@ def effect_text(name: str, effect: Effect, registry: Registry, is_long: bool) ->
 
 
 def form_lines(effect: Effect, is_long: bool) -> list[str]:
-    lines = [f"  port {port}{f' += {returned_text(f)}' if is_long else ''}" for port, f in effect.adds.items()]
+    def text(function: Callable[..., Any]) -> str:
+        """The expression, with the names that arguments stand for here."""
+        return returned_text(function, {a: effect.binds.get(a, a) for a in signature(function).parameters})
+
+    lines = [f"  port {port}{f' += {text(f)}' if is_long else ''}" for port, f in effect.adds.items()]
     if is_long:
-        lines += [f"  state {s.name} [{s.unit}], d {s.name}/dt = {returned_text(s.rate)}" for s in effect.states]
-        lines += [f"  {d.name}: {returned_text(d.of)} at t - {d.by}" for d in effect.delays]
-        lines += [f"  switch {g.name} where {returned_text(g.function)} is 0" for g in effect.guards]
+        lines += [f"  state {s.name} [{s.unit}], d {s.name}/dt = {text(s.rate)}" for s in effect.states]
+        lines += [f"  {d.name}: {text(d.of)} at t - {d.by}" for d in effect.delays]
+        lines += [f"  switch {g.name} where {text(g.function)} is 0" for g in effect.guards]
     lines += [f"  approximates the form {effect.exact.form}"] if effect.exact is not None else []
     return [*lines, *(f"  {parameter_text(p)}" for p in effect.parameters)]
 

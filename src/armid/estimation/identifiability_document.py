@@ -77,16 +77,18 @@ def identifiability_document(
 
 def answer_and_remarks(result: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return which parameters are bounded, which move together and the best offer; and the other remarks."""
-    bounded, by_others, unbounded = [], [], []
+    bounded, by_others, unbounded = list[str](), list[str](), list[str]()
     for name, p in result["parameters"].items():
         deviation = deviation_text(name, p, p["deviation"])
         if p["profile"]["bounded_low"] and p["profile"]["bounded_high"]:
-            (by_others if deviation == UNDETERMINED else bounded).append(f"{name} ({deviation})")
+            if deviation == UNDETERMINED:
+                by_others.append(name)
+            else:
+                bounded.append(f"{name} ({deviation})")
         else:
             unbounded.append(name)
     said = [f"Bounded on both sides at 95 %, with this standard deviation: {', '.join(bounded)}."] if bounded else []
-    names = ", ".join(name.partition(" ")[0] for name in by_others)
-    said += [f"Bounded by the limits of other parameters alone: {names}."] if by_others else []
+    said += [f"Bounded by the limits of other parameters alone: {', '.join(by_others)}."] if by_others else []
     said += [f"Not bounded on both sides: {', '.join(unbounded)}."] if unbounded else []
     n = len(result["groups"])
     *others, best = result["remarks"][n:]
