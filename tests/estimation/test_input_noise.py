@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from armid import identify, read_campaign
+from armid import close_loop, identify, read_campaign
 from armid.estimation.identify_document import answer, details_of, result_of
 from armid.estimation.input_noise import moved_by_inputs, pooled_noise
+from armid.loop import report_of
 from armid.record import write_campaign
 from armid.record.sensor import InputNoise, noise_of_input
 
@@ -110,3 +111,15 @@ def test_drawn_errors_stay_while_a_rounded_value_stays():
     assert np.abs(errors).max() <= 0.005
     white = replace(InputNoise(step=0.01), rms=1.0).drawn(np.zeros(4000), np.random.default_rng(0))
     assert np.std(white) == pytest.approx(1.0, rel=0.05)
+
+
+@pytest.mark.slow
+def test_the_loop_says_so_of_the_model_that_it_ends_with(tmp_path):
+    """Friction is found beside it, in a model of other parameters than the declared one."""
+    records = campaign(tmp_path / "axis", noisy)
+    found = close_loop(records, candidates=["coulomb", "viscous"], fixed={"damping": 0.0})
+    assert found.effects == ("viscous",)
+    rms = found.outputs["angular_velocity"]["moved_by_inputs"]
+    fit = identify(records)
+    assert rms == pytest.approx(next(iter(moved_by_inputs(fit.train_replays, fit.candidate).values())), rel=0.1)
+    assert report_of(found)["probabilities"]["unknown"] > 0.5

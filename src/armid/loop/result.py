@@ -227,7 +227,7 @@ class ClosedLoop(Result):
         train = self.before.train
         pairs = [(r.place, level.rms) for r, level in zip(train.replays, train.data.levels, strict=True)]
         levels = [(o, [rms for place, rms in pairs if place == i]) for i, o in enumerate(self.campaign.plant.outputs)]
-        moved = moved_by_inputs(train.replays, self.after.train.candidate)
+        moved = moved_by_inputs(self.after.train.replays, self.after.train.candidate)
         return {o.name: {"unit": o.unit, "noise_rms": float(np.mean(rms)), "moved_by_inputs": moved.get(o.name, 0.0)}
                 for o, rms in levels if rms}  # fmt: skip
 
