@@ -28,13 +28,13 @@ from input_texts import TABLE_STUDY
 settings.register_profile("armid", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("armid")
 ROOT = Path(__file__).parents[1]
-# Fast tests run the lines of these packages too: their slow ones go without the tracer of coverage, which makes them
-# twice as long.
-NOT_TRACED = ("bench", "contract", "engine", "estimation", "identifiers", "model", "problem")
+# Fast tests, or the loops of others, run the lines of these packages too: their slow ones go without the tracer of
+# coverage, which makes them up to twice as long.
+NOT_TRACED = ("bench", "contract", "engine", "estimation", "identifiers", "inference", "model", "problem")
 # Those that take longest come first, so that two processes end together.
 LONGEST = (
     "test_a_late_voltage_is_no_late_torque", "test_the_small_blind_suite", "test_every_effect_keeps_its_contract",
-    "test_a_runner_killed_twenty_times", "test_the_notebook_runs", "test_the_small_table",
+    "test_a_runner_killed_again_and_again", "test_the_notebook_runs", "test_the_small_table",
     "test_every_snippet_runs_and_every_output_is_true", "test_random_candidates_agree_with_the_test_stand",
 )  # fmt: skip
 Array = NDArray[np.float64]
