@@ -15,7 +15,7 @@ from armid.model import Array
 from armid.problem.problem import Replay
 from armid.report.document import points, record_axes, small_axes, value_text
 from armid.report.style import COLOURS, GREY, OKABE_ITO, PALE, entitle, legend_below, log_axis, panels, pyplot
-from armid.units import shown
+from armid.units import scale_of, shown
 
 LOOKS = (("before", OKABE_ITO["vermilion"]), ("after", OKABE_ITO["blue"]))
 AFTER = OKABE_ITO["blue"]
@@ -197,7 +197,7 @@ def interval_figure(campaign: str, models: Sequence[Mapping[str, Any]], averaged
         axis.set_axis_off()
     labels = [fill(f"{m['model']} ({m['probability']:.2f})", 34) for m in models] + ["all models"]
     for axis, name in zip(axes.flat, names, strict=False):
-        factor, unit = shown(1.0, averaged[name]["unit"])
+        unit, factor = scale_of(averaged[name]["unit"], averaged[name]["value"])
         entries = [*(m["parameters"][name] for m in models), averaged[name]]
         for i, p in enumerate(entries):
             axis.errorbar([factor * p["value"]], [i], xerr=ends_of(p, factor), fmt="o", capsize=4,
@@ -307,16 +307,18 @@ def signal_panel(axis: Any, missing: Missing, best: Dependence, variable: str) -
     """Draw the signal of every record against one variable, with the curve where it is the one that was fitted."""
     model, signal = missing.lacking.records.replays[0].model, next(s for s in missing.signals if s.port == best.port)
     factor, name = shown(1.0, unit_of(variable, model))
+    largest = float(np.max(np.abs(np.concatenate(signal.signals)), initial=0.0))
+    unit, scale = scale_of(model.plant.ports[best.port], largest)
     for segment, values in zip(missing.segments, signal.signals, strict=True):
         colour = COLOURS[segment.group % len(COLOURS)]
-        axis.plot(factor * segment.variables[variable], values, ".", ms=3, color=colour)
+        axis.plot(factor * segment.variables[variable], scale * values, ".", ms=3, color=colour)
     if variable == best.variable and best.factor == "1":
         knots = np.linspace(best.first, best.last, len(best.heights))
         seen = np.concatenate([m.variables[variable] for m in missing.segments])
         heights = np.linalg.lstsq(hats(seen, best.first, best.last), np.concatenate(signal.signals), rcond=None)[0]
-        axis.plot(factor * knots, heights, "-", color="black", label="curve through it")
+        axis.plot(factor * knots, scale * heights, "-", color="black", label="curve through it")
         axis.legend(fontsize="small")
-    axis.set(xlabel=f"{variable} [{name}]", ylabel=f"missing at {best.port} [{model.plant.ports[best.port]}]")
+    axis.set(xlabel=f"{variable} [{name}]", ylabel=f"missing at {best.port} [{unit}]")
 
 
 def unit_of(variable: str, model: Any) -> str:
