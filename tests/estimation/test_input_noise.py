@@ -73,6 +73,13 @@ def test_what_a_column_shows(tmp_path, measured, rms, step):
         assert found.step == pytest.approx(step, rel=1e-6, abs=1e-4)
 
 
+def test_the_step_is_the_smallest_that_a_record_shows(tmp_path):
+    """A motion that passes few values shows multiples of it."""
+    records = campaign(tmp_path / "axis", exact).train
+    steps = zip(records, (InputNoise(0.0, 0.0015), InputNoise(0.0, 0.0001)), strict=True)
+    assert pooled_noise([replace(r, input_noise={"u": noise}) for r, noise in steps]) == {"u": InputNoise(0.0, 0.0001)}
+
+
 @pytest.mark.parametrize("command", [
     np.repeat(np.random.default_rng(1).choice([-1.0, 1.0], 400), 3),
     np.repeat(np.linspace(-12.0, 12.0, 25), 40),

@@ -47,13 +47,17 @@ def moved_by_inputs(replays: Sequence[Replay], candidate: Array) -> dict[str, fl
 
 
 def pooled_noise(records: Sequence[Record]) -> dict[str, InputNoise]:
-    """Return the noise of each measured input: the median over the records that show it, the largest step."""
+    """Return the noise of each measured input: the median over the records that show it, and their smallest step.
+
+    A motion that passes few values shows multiples of the step.
+    """
     seen: dict[str, list[InputNoise]] = {}
     for record in records:
         for name, noise in record.input_noise.items():
             seen.setdefault(name, []).append(noise)
-    return {name: InputNoise(float(np.median([n.rms for n in noises])), max(n.step for n in noises))
-            for name, noises in seen.items()}  # fmt: skip
+    rms = {name: float(np.median([n.rms for n in noises])) for name, noises in seen.items()}
+    steps = {name: min((n.step for n in noises if n.step), default=0.0) for name, noises in seen.items()}
+    return {name: InputNoise(rms[name], steps[name]) for name in seen}
 
 
 def with_errors(record: Record, noise: Mapping[str, InputNoise], rng: np.random.Generator) -> Record:
