@@ -84,7 +84,8 @@ def test_the_step_is_the_smallest_that_a_record_shows(tmp_path):
     np.repeat(np.random.default_rng(1).choice([-1.0, 1.0], 400), 3),
     np.repeat(np.linspace(-12.0, 12.0, 25), 40),
     np.sin(TIMES) * (TIMES > 0.5),
-], ids=["pseudo-random", "staircase", "sine"])  # fmt: skip
+    0.0015 * np.abs((np.arange(1200) + 100) % 400 - 200.0),
+], ids=["pseudo-random", "staircase", "sine", "ramps"])  # fmt: skip
 def test_a_command_is_known_exactly(command):
     still = np.random.default_rng(2).normal(0.0, 0.01, len(command))
     assert noise_of_input(command, [(still, True)]) == InputNoise()

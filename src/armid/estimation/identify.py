@@ -183,6 +183,9 @@ class Identification(Result):
             return dict.fromkeys(information.names, "the search has not come to the minimum")
         if any(level.from_residual for level in information.levels):
             return dict.fromkeys(information.names, "what the model leaves is more than the noise")
+        outputs = outputs_entry(self.train_replays, self.candidate).values()
+        if any(output["moved_by_inputs"] > output["noise_rms"] for output in outputs):
+            return dict.fromkeys(information.names, "noise of the inputs moves the model by more than that of a sensor")
         doubts = dict.fromkeys(information.names, "")
         if self.scatter is not None:
             shares = zip(information.names, self.scatter.bias / information.deviation, strict=True)

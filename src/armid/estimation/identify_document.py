@@ -27,6 +27,7 @@ from armid.report.document import (
     error_table,
     listing,
     made_section,
+    moved_text,
     noise_text,
     others_text,
     plain,
@@ -104,7 +105,8 @@ def answer(result: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, 
         out = f"{rmse_text(holdout, result['unit'])} on those held out"
     output, unit = next(iter(result["outputs"].values())), shown(0.0, result["unit"])[1]
     second = (f"Error (RMSE): {rmse_text(train, result['unit'])} {unit} on the records fitted, {out}; "
-              f"{noise_text(output['noise_rms'], output, train)}.{others_text(train, holdout)}")  # fmt: skip
+              f"{noise_text(output['noise_rms'], output, train)}.{others_text(train, holdout)}"
+              f"{moved_text(result['outputs'])}")  # fmt: skip
     held = [name for name, p in free.items() if p["bound_active"]]
     doubts = [f"Held by a bound, and not to be trusted: {', '.join(held)}."] if held else []
     doubts += [f"Not determined by these records: {', '.join(lost)}."] if lost else []
@@ -339,4 +341,4 @@ def noise_remark(replay: Replay) -> str:
     if noise.source == "rest":
         mean = shown(noise.mean or 0.0, unit)[0]
         return f"{text} and mean {mean:+.3g} {name} (shown, not subtracted) from {noise.n_samples} samples at rest."
-    return f"{text} from high-frequency differences of the motion, as no long rest, or too coarse a one, was recorded."
+    return f"{text} from high-frequency differences of the motion, as no rest with still inputs is long and fine."

@@ -223,9 +223,11 @@ def noise_of_input(values: Array, outputs: Sequence[tuple[Array, bool]]) -> Inpu
 def rounding_of_input(values: Array) -> float:
     """Return the step with which a sensor rounds an input, 0 for a fine one and for a command.
 
-    A command stays, or jumps; what is measured passes one step after the other, or changes with each sample.
+    A command stays, jumps, or runs straight; what is measured passes its steps unevenly.
     """
-    return step_of(values) if np.mean(np.diff(values) != 0.0) >= CHANGING else 0.0
+    step = step_of(values)
+    steps = np.rint(np.diff(values) / step) if step else np.zeros(1)
+    return step if np.mean((steps != 0.0) & np.append(True, np.diff(steps) != 0.0)) >= CHANGING else 0.0
 
 
 def rest_between(values: Array, still: Mask, is_speed: bool) -> Array:

@@ -379,6 +379,16 @@ def noise_text(noise: float, output: Mapping[str, Any], error: Mapping[str, Any]
     return text + (", and what remains may be that alone" if may_be_inputs(noise, moved, error["rmse"]) else "")
 
 
+def moved_text(outputs: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return how far noise of the inputs moves each output but the first, where it is more than its own noise."""
+    said = ""
+    for name, output in list(outputs.items())[1:]:
+        if output["moved_by_inputs"] >= output["noise_rms"]:
+            (moved, unit), (noise, _) = (shown(output[key], output["unit"]) for key in ("moved_by_inputs", "noise_rms"))
+            said += f" Noise of the inputs moves {name} by {moved:.3g} {unit}; that of its sensor is {noise:.3g}."
+    return said
+
+
 def may_be_inputs(noise: float, moved: float, left: float | None) -> bool:
     """Tell whether what is left of a model, an RMSE, may be what noise of the inputs does to it."""
     return left is not None and moved >= noise and noise < left < NO_MORE * float(np.hypot(noise, moved))
