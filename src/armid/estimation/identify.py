@@ -38,6 +38,7 @@ from armid.problem.problem import (
 from armid.problem.similarity import similarity
 from armid.problem.space import Space
 from armid.record import Campaign
+from armid.report.document import inputs_act
 from armid.report.result import IDENTIFICATION, Kind, Result
 from armid.units import angles_in, scale_of
 
@@ -183,8 +184,8 @@ class Identification(Result):
             return dict.fromkeys(information.names, "the search has not come to the minimum")
         if any(level.from_residual for level in information.levels):
             return dict.fromkeys(information.names, "what the model leaves is more than the noise")
-        outputs = outputs_entry(self.train_replays, self.candidate).values()
-        if any(output["moved_by_inputs"] > output["noise_rms"] for output in outputs):
+        outputs, left = outputs_entry(self.train_replays, self.candidate), self.train.outputs
+        if any(inputs_act(o["noise_rms"], o["moved_by_inputs"], left[name].rmse) for name, o in outputs.items()):
             return dict.fromkeys(information.names, "noise of the inputs moves the model by more than that of a sensor")
         doubts = dict.fromkeys(information.names, "")
         if self.scatter is not None:

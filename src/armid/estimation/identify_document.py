@@ -106,7 +106,7 @@ def answer(result: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, 
     output, unit = next(iter(result["outputs"].values())), shown(0.0, result["unit"])[1]
     second = (f"Error (RMSE): {rmse_text(train, result['unit'])} {unit} on the records fitted, {out}; "
               f"{noise_text(output['noise_rms'], output, train)}.{others_text(train, holdout)}"
-              f"{moved_text(result['outputs'])}")  # fmt: skip
+              f"{moved_text(result['outputs'], train)}")  # fmt: skip
     held = [name for name, p in free.items() if p["bound_active"]]
     doubts = [f"Held by a bound, and not to be trusted: {', '.join(held)}."] if held else []
     doubts += [f"Not determined by these records: {', '.join(lost)}."] if lost else []

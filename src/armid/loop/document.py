@@ -212,7 +212,7 @@ def error_sentence(report: Mapping[str, Any]) -> str:
     if not report["effects"]:
         text, errors = f"{now} {unit} RMSE,", [after[which]]
     noise = noise_text(of_those or report["noise_rms"], output, after[which])
-    return f"Error on {on}: {text} {noise}{alone}.{others_text(*errors)}{moved_text(report['outputs'])}"
+    return f"Error on {on}: {text} {noise}{alone}.{others_text(*errors)}{moved_text(report['outputs'], after[which])}"
 
 
 def step_table(report: Mapping[str, Any]) -> Table:

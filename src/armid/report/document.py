@@ -267,6 +267,8 @@ def unlike(names: list[str]) -> list[str]:
 MOST_RECORDS = 24
 # What is left of a model and is below this many times what noise of sensor and inputs does may be that alone.
 NO_MORE = 1.5
+# Of what noise of the inputs does a fit leaves at least this share, as parameters cannot follow it.
+LEFT_OF_MOVED = 0.25
 ERROR_NOTE = (
     "RMSE: pooled over all samples. NRMSE: each record divided by its rms. chi2/sample: mean of (residual/noise)^2, 1 "
     "where only noise is left. S, S1, S2: similarity degrees of the paper (whole, numbers, shape), mean by duration; "
@@ -373,17 +375,18 @@ def noise_text(noise: float, output: Mapping[str, Any], error: Mapping[str, Any]
     """
     value, unit = shown(noise, output["unit"])
     text, moved = f"the noise is {value:.3g} {unit}", output["moved_by_inputs"]
-    if moved < noise:
+    if not inputs_act(noise, moved, error["rmse"]):
         return text
     text += f"; that of the inputs moves the model by {shown(moved, output['unit'])[0]:.3g} {unit}"
     return text + (", and what remains may be that alone" if may_be_inputs(noise, moved, error["rmse"]) else "")
 
 
-def moved_text(outputs: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return how far noise of the inputs moves each output but the first, where it is more than its own noise."""
+def moved_text(outputs: Mapping[str, Mapping[str, Any]], error: Mapping[str, Any]) -> str:
+    """Return how far noise of the inputs moves each output but the first, where this shows; error: of all outputs."""
     said = ""
     for name, output in list(outputs.items())[1:]:
-        if output["moved_by_inputs"] >= output["noise_rms"]:
+        left = error["outputs"].get(name, {"rmse": None})["rmse"]
+        if inputs_act(output["noise_rms"], output["moved_by_inputs"], left):
             (moved, unit), (noise, _) = (shown(output[key], output["unit"]) for key in ("moved_by_inputs", "noise_rms"))
             said += f" Noise of the inputs moves {name} by {moved:.3g} {unit}; that of its sensor is {noise:.3g}."
     return said
@@ -391,7 +394,15 @@ def moved_text(outputs: Mapping[str, Mapping[str, Any]]) -> str:
 
 def may_be_inputs(noise: float, moved: float, left: float | None) -> bool:
     """Tell whether what is left of a model, an RMSE, may be what noise of the inputs does to it."""
-    return left is not None and moved >= noise and noise < left < NO_MORE * float(np.hypot(noise, moved))
+    return left is not None and inputs_act(noise, moved, left) and left < NO_MORE * float(np.hypot(noise, moved))
+
+
+def inputs_act(noise: float, moved: float, left: float | None) -> bool:
+    """Tell whether noise of the inputs moves an output by more than its own noise, and shows in what is left, an RMSE.
+
+    Where it does not show, the inputs are exact: their steps are those of a command.
+    """
+    return left is not None and moved >= noise and left > float(np.hypot(noise, LEFT_OF_MOVED * moved))
 
 
 def rmse_text(error: Mapping[str, Any], unit: str) -> str:
