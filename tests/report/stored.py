@@ -52,6 +52,7 @@ def loop_report(name: str = "arm") -> dict[str, Any]:
     return {
         "version": 2, "probabilities": chances,
         "campaign": name, "plant": "shell_transfer_arm", "unit": "rad/s", "noise_rms": 0.004,
+        "outputs": {"speed": {"unit": "rad/s", "noise_rms": 0.004, "moved_by_inputs": 0.0}},
         "noise_rms_holdout": None, "also": [], "next_steps": [], "known_together": [], "taken_as_exact": [],
         "verdict": "cannot_tell_apart", "effects": [f"{name}_x"],
         "error": {"before": {"train": errors(0.02), "holdout": errors(0.03)}, "after": step["error"]},

@@ -374,7 +374,7 @@ def noise_text(noise: float, output: Mapping[str, Any], error: Mapping[str, Any]
     noise: [unit]. output: its entry of "outputs". error: of the model on the records that are spoken of.
     """
     value, unit = shown(noise, output["unit"])
-    text, moved = f"the noise is {value:.3g} {unit}", output["moved_by_inputs"]
+    text, moved = f"the noise is {value:.3g} {unit}", moved_of(output)
     if not inputs_act(noise, moved, error["rmse"]):
         return text
     text += f"; that of the inputs moves the model by {shown(moved, output['unit'])[0]:.3g} {unit}"
@@ -386,10 +386,15 @@ def moved_text(outputs: Mapping[str, Mapping[str, Any]], error: Mapping[str, Any
     said = ""
     for name, output in list(outputs.items())[1:]:
         left = error["outputs"].get(name, {"rmse": None})["rmse"]
-        if inputs_act(output["noise_rms"], output["moved_by_inputs"], left):
-            (moved, unit), (noise, _) = (shown(output[key], output["unit"]) for key in ("moved_by_inputs", "noise_rms"))
+        if inputs_act(output["noise_rms"], moved_of(output), left):
+            (moved, unit), (noise, _) = (shown(x, output["unit"]) for x in (moved_of(output), output["noise_rms"]))
             said += f" Noise of the inputs moves {name} by {moved:.3g} {unit}; that of its sensor is {noise:.3g}."
     return said
+
+
+def moved_of(output: Mapping[str, Any]) -> float:
+    """Return how far noise of the inputs moves an output; results of before this was asked do not hold it."""
+    return float(output.get("moved_by_inputs", 0.0))
 
 
 def may_be_inputs(noise: float, moved: float, left: float | None) -> bool:
