@@ -114,18 +114,18 @@ def turned(voltage, interval):
     return np.array(states)[:, 1]
 
 
+def disc_records(rng, n_records, n_steps, n_rest):
+    """Tables of steps of the voltage, after some samples of rest."""
+    for _ in range(n_records):
+        voltage = np.repeat(rng.uniform(-9.0, 9.0, n_steps), 40)
+        voltage[:n_rest] = 0.0
+        speed = turned(voltage, 0.01) + rng.normal(0.0, 0.06, len(voltage))
+        yield {"time_s": 0.01 * np.arange(len(voltage)), "voltage_V": voltage, "angular_velocity_rad_s": speed}
+
+
 def test_what_speed_and_voltage_cannot_separate_has_the_width_of_its_box(tmp_path):
     """Inertia, torque constant, moment and dead zone grow alike, along a way that bends; no second name is needed."""
-    rng = np.random.default_rng(22)
-
-    def records():
-        for _ in range(4):
-            voltage = np.repeat(rng.uniform(-9.0, 9.0, 16), 40)
-            voltage[:50] = 0.0
-            speed = turned(voltage, 0.01) + rng.normal(0.0, 0.06, len(voltage))
-            yield {"time_s": 0.01 * np.arange(len(voltage)), "voltage_V": voltage, "angular_velocity_rad_s": speed}
-
-    declared = campaign(tmp_path, DISC, records())
+    declared = campaign(tmp_path, DISC, disc_records(np.random.default_rng(22), 4, 16, 50))
     found = close_loop(declared.model(), declared, {n: EFFECTS[n] for n in ("dead_zone", "coulomb")})
     assert [s.effect for s in found.steps] == ["dead_zone"]
     assert found.inference.probabilities["effects"].get("coulomb", 0.0) < 0.2
@@ -138,16 +138,7 @@ def test_what_speed_and_voltage_cannot_separate_has_the_width_of_its_box(tmp_pat
 
 def test_what_the_added_effect_cannot_be_told_apart_from_widens_its_own_strength_too(tmp_path):
     """The slope that is not declared makes up for all others exactly; a fit with it may not end worse than without."""
-    rng = np.random.default_rng(23)
-
-    def records():
-        for _ in range(3):
-            voltage = np.repeat(rng.uniform(-9.0, 9.0, 12), 40)
-            voltage[:60] = 0.0
-            speed = turned(voltage, 0.01) + rng.normal(0.0, 0.06, len(voltage))
-            yield {"time_s": 0.01 * np.arange(len(voltage)), "voltage_V": voltage, "angular_velocity_rad_s": speed}
-
-    declared = campaign(tmp_path, DISC, records())
+    declared = campaign(tmp_path, DISC, disc_records(np.random.default_rng(23), 3, 12, 60))
     found = close_loop(declared.model(), declared, {n: EFFECTS[n] for n in ("dead_zone", "viscous")},
                        fixed={"friction": 0.0})  # fmt: skip
     chances, estimates = found.inference.probabilities["effects"], {e.name: e for e in found.after.estimates}

@@ -223,8 +223,8 @@ HEADERS = {
 DRIVEN_IN = {"mV": ("V", 1e-3), "kV": ("V", 1e3), "mA": ("A", 1e-3), "kN": ("N", 1e3), "mN m": ("N_m", 1e-3),
              "mNm": ("N_m", 1e-3), "kNm": ("N_m", 1e3), "kN m": ("N_m", 1e3)}  # fmt: skip
 LINEAR, DRIVES = {"m", "mm", "m_s", "mm_s", "N"}, {"V", "A", "N", "N_m"}
-# A machine is at rest as long as its signal stays within so many deviations of that of its first rows.
-BEYOND_REST = 5.0
+# A machine is at rest as long as its signal is nearer to its first rows than so many times their range.
+BEYOND_REST = 2.5
 # Share of equal neighbours from which on an input keeps its value between samples.
 KEPT = 0.5
 
@@ -424,9 +424,7 @@ def about(columns: Mapping[str, Array], renamed: Mapping[str, str]) -> str:
     values = columns[measured]
     present = np.flatnonzero(np.isfinite(values))
     first = values[present[:FEWEST_REST_SAMPLES]]
-    moved = np.flatnonzero(
-        np.abs(values[present] - np.median(first)) > BEYOND_REST * max(np.std(first), np.ptp(first) / 2.0)
-    )
+    moved = np.flatnonzero(np.abs(values[present] - np.median(first)) > BEYOND_REST * np.ptp(first))
     n_rest = int(present[moved[0]]) if moved.size and stands_still(first, 0.0, False) else 0
     shorter = f"fewer than {FEWEST_REST_SAMPLES} rows of rest first"
     rest = f"{times[n_rest] - times[0]:.3g} s of rest first" if n_rest >= FEWEST_REST_SAMPLES else shorter

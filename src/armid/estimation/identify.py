@@ -429,7 +429,12 @@ def output_errors(replays: Sequence[Replay], candidate: Array) -> Errors:
 
 def outputs_entry(replays: Sequence[Replay], candidate: Array) -> dict[str, dict[str, Any]]:
     """Return output -> its unit, its noise (the mean over records) and how far that of inputs moves it, for JSON."""
-    levels = [(o, [r.record.noise.rms for r in replays if r.place == i])
+    return entries_of_noise(replays, [r.record.noise.rms for r in replays], candidate)
+
+
+def entries_of_noise(replays: Sequence[Replay], noise: Sequence[float], candidate: Array) -> dict[str, dict[str, Any]]:
+    """Return what `outputs_entry` does, with a noise for each replay, its unit."""
+    levels = [(o, [rms for r, rms in zip(replays, noise, strict=True) if r.place == i])
               for i, o in enumerate(replays[0].model.plant.outputs)]  # fmt: skip
     moved = moved_by_inputs(replays, candidate)
     return {o.name: {"unit": o.unit, "noise_rms": float(np.mean(rms)), "moved_by_inputs": moved.get(o.name, 0.0)}

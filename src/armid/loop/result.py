@@ -8,9 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from armid.estimation.advice import Advice
-from armid.estimation.identify import JointErrors, errors_by_file, record_errors
+from armid.estimation.identify import JointErrors, entries_of_noise, errors_by_file, record_errors
 from armid.estimation.information import NORMAL_95
-from armid.estimation.input_noise import moved_by_inputs
 from armid.estimation.least_squares import held_by_bound
 from armid.inference.carry_over import Missed, least_noise, missed_records
 from armid.inference.checks import Diagnosis, Residuals
@@ -224,12 +223,8 @@ class ClosedLoop(Result):
     @cached_property
     def outputs(self) -> dict[str, dict[str, Any]]:
         """Output -> its unit, the noise of its train records, and how far noise of their inputs moves the model."""
-        train = self.before.train
-        pairs = [(r.place, level.rms) for r, level in zip(train.replays, train.data.levels, strict=True)]
-        levels = [(o, [rms for place, rms in pairs if place == i]) for i, o in enumerate(self.campaign.plant.outputs)]
-        moved = moved_by_inputs(self.after.train.replays, self.after.train.candidate)
-        return {o.name: {"unit": o.unit, "noise_rms": float(np.mean(rms)), "moved_by_inputs": moved.get(o.name, 0.0)}
-                for o, rms in levels if rms}  # fmt: skip
+        noise = [level.rms for level in self.before.train.data.levels]
+        return entries_of_noise(self.after.train.replays, noise, self.after.train.candidate)
 
     @property
     def noise_rms(self) -> float:
