@@ -7,8 +7,10 @@ import pytest
 
 from armid import close_loop, identify, read_campaign
 from armid.estimation.identify_document import answer, details_of, result_of
-from armid.estimation.input_noise import moved_by_inputs, pooled_noise
+from armid.estimation.input_noise import averages_of, moved_by_inputs, pooled_noise, smoothed
+from armid.estimation.noise_model import white_level
 from armid.loop import report_of
+from armid.loop.document import error_sentence
 from armid.record import write_campaign
 from armid.record.sensor import InputNoise, noise_of_input
 
@@ -31,10 +33,10 @@ def speed(drive):
     return np.array(moved)
 
 
-def campaign(folder, measured):
+def campaign(folder, measured, driven=torque):
     tables, rng = {}, np.random.default_rng(5)
     for i in range(3):
-        drive = torque(i)
+        drive = driven(i)
         tables[f"r{i}.csv"] = {
             "time_s": TIMES,
             "drive_N_m": measured(drive, rng),
@@ -112,22 +114,97 @@ def test_it_is_said_that_this_may_be_all_that_remains(tmp_path):
     assert "inputs" not in " ".join(answer(result_of(without), details_of(without)))
 
 
-def test_drawn_errors_stay_while_a_rounded_value_stays():
-    values = np.repeat([0.0, 0.01, 0.02], 50)
-    errors = InputNoise(step=0.01).drawn(values, np.random.default_rng(0))
+def test_rounding_stays_while_the_rounded_value_stays():
+    values = np.repeat([0.0, 0.01, 0.02], 50) + np.random.default_rng(1).uniform(-0.004, 0.004, 150)
+    errors = InputNoise(step=0.01).rounding(values, np.random.default_rng(0))
     assert len(np.unique(errors)) == 3
     assert np.abs(errors).max() <= 0.005
-    white = replace(InputNoise(step=0.01), rms=1.0).drawn(np.zeros(4000), np.random.default_rng(0))
+
+
+INPUTS = {
+    "waves": np.sin(2.0 * np.pi * 0.5 * TIMES) + 0.4 * np.sin(2.0 * np.pi * 1.3 * TIMES),
+    "staircase": np.repeat(np.random.default_rng(4).uniform(-1.0, 1.0, 12), 100),
+    "triangle": np.abs((0.5 * TIMES + 1.0) % 4.0 - 2.0) - 1.0,
+}
+
+
+@pytest.mark.parametrize("name", INPUTS)
+def test_the_estimate_is_closer_than_the_column_and_knows_its_error(name):
+    """The error may be correlated over the whole record, so that several columns are looked at."""
+    true, misses, claimed = INPUTS[name] * (TIMES > 0.6), [], []
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        column = true + rng.normal(0.0, 0.03, len(true))
+        found = smoothed(column, InputNoise(rms=0.03))
+        misses.append(np.mean((found.values - true) ** 2))
+        claimed.append(np.mean(found.errors(16, rng) ** 2))
+        assert np.sqrt(misses[-1]) < 0.7 * 0.03
+        # what drives a machine far is the sum of the errors
+        assert abs(np.sum(found.values - column)) < 1e-6 * len(true)
+    assert np.sqrt(np.mean(misses) / np.mean(claimed)) == pytest.approx(1.0, abs=0.25)
+
+
+def test_its_answer_is_turned_white():
+    """A random walk with noise of a sensor is an autoregression with one average, which is known (Harvey 1989, 2.4)."""
+    rng, step, noise = np.random.default_rng(3), 0.5, 1.0
+    parts = [np.cumsum(rng.normal(0.0, step, 4000)) + rng.normal(0.0, noise, 4000) for _ in range(6)]
+    terms, averages, innovation = averages_of(parts)
+    ratio = (step / noise) ** 2
+    gain = 0.5 * (np.sqrt(ratio**2 + 4.0 * ratio) - ratio)
+    assert innovation == pytest.approx(noise / np.sqrt(1.0 - gain), rel=0.02)
+    level = replace(white_level(noise, 100), terms=terms, averages=averages, innovation=innovation)
+    white = level.white(parts[0], [len(parts[0])])
     assert np.std(white) == pytest.approx(1.0, rel=0.05)
+    for lag in (1, 2, 5, 20):
+        assert abs(np.mean(white[lag:] * white[:-lag])) < 4.0 / np.sqrt(len(white))
+
+
+def test_pieces_are_turned_white_each_from_its_first_sample_on():
+    level = replace(white_level(1.0, 100), terms=np.array([1.0]), averages=np.array([-0.5]), innovation=2.0)
+    piece = np.random.default_rng(2).normal(size=50)
+    both = level.white(np.concatenate([piece, piece]), [50, 50])
+    assert both[:50] == pytest.approx(both[50:])
+    assert both[0] == pytest.approx(piece[0] / 2.0)
+    assert both[1] == pytest.approx((piece[1] - piece[0]) / 2.0 + 0.5 * both[0])
 
 
 @pytest.mark.slow
-def test_the_loop_says_so_of_the_model_that_it_ends_with(tmp_path):
-    """Friction is found beside it, in a model of other parameters than the declared one."""
+def test_a_sound_machine_with_a_noisy_torque_lacks_nothing(tmp_path):
+    found = close_loop(campaign(tmp_path / "axis", noisy))
+    assert found.verdict == "no_discrepancy"
+    assert found.inference.probabilities["unknown"] < 0.05
+    inertia = next(e for e in found.after.estimates if e.name == "inertia")
+    assert inertia.low < INERTIA < inertia.high
+    assert inertia.trusted
+
+
+@pytest.mark.slow
+def test_friction_is_found_beside_it_and_judged_by_the_model_that_the_loop_ends_with(tmp_path):
+    """That model has other parameters than the declared one."""
     records = campaign(tmp_path / "axis", noisy)
     found = close_loop(records, candidates=["coulomb", "viscous"], fixed={"damping": 0.0})
     assert found.effects == ("viscous",)
+    assert found.steps[0].claimed
     rms = found.outputs["angular_velocity"]["moved_by_inputs"]
     fit = identify(records)
     assert rms == pytest.approx(next(iter(moved_by_inputs(fit.train_replays, fit.candidate).values())), rel=0.1)
-    assert report_of(found)["probabilities"]["unknown"] > 0.5
+    assert report_of(found)["probabilities"]["unknown"] < 0.05
+    assert "that of the inputs moves the model by" in error_sentence(report_of(found))
+
+
+@pytest.mark.slow
+def test_inputs_count_as_exact_where_the_records_are_more_probable_so(tmp_path):
+    """What a controller computes of a noisy speed looks as if it were measured with noise, and is exact."""
+
+    def computed(seed):
+        return torque(seed) + np.random.default_rng(seed).normal(0.0, TORQUE_NOISE, len(TIMES))
+
+    records = campaign(tmp_path / "axis", exact, computed)
+    records = replace(records, records=tuple(replace(r, input_noise={"u": InputNoise(rms=TORQUE_NOISE)})
+                                             for r in records.records))  # fmt: skip
+    steps = []
+    found = close_loop(records, candidates=["viscous"], fixed={"damping": 0.0}, told=steps.append)
+    assert "taking the measured inputs as measured with noise" in steps
+    assert found.inference.exploration.library.as_read is None
+    assert found.effects == ("viscous",)
+    assert found.steps[0].claimed

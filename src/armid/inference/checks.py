@@ -1,7 +1,7 @@
 """Is there a discrepancy, and where: tests of a whitened residual against noise."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from itertools import chain, pairwise
 
@@ -13,12 +13,13 @@ from armid.engine import along
 from armid.estimation.constants import columns_of, moved_record, slopes_of_constants
 from armid.estimation.identify import JointErrors, campaign_errors
 from armid.estimation.information import start_changes
+from armid.estimation.input_noise import estimated, levels_with_inputs, pooled_noise
 from armid.inference.decisions import CERTAIN, SIGNIFICANCE
 from armid.inference.library import Library, calibrated_replays
 from armid.inference.model import Fit, beyond, decomposed
 from armid.inference.whitening import WhitenedData, WhiteRecords, whitened
 from armid.model import Array, Model
-from armid.problem.problem import Replay
+from armid.problem.problem import Replay, with_each
 from armid.record import Record
 from armid.record.sensor import memory_of
 
@@ -75,19 +76,22 @@ class Residuals:
 
     @property
     def noise_rms(self) -> float:
-        """Noise of all samples of the first output together, [its unit]."""
-        return next(iter(self.noise_of.values()))
+        """Noise of the sensor of the first output, all samples together [its unit]."""
+        return next(iter(self.pooled([level.rms for level in self.data.levels]).values()))
 
     @property
     def noise_of(self) -> dict[str, float]:
-        """Noise of all samples of each output that is recorded, by its name, [its unit]."""
-        noise: dict[str, float] = {}
-        for place in sorted({r.place for r in self.replays}):
-            of = [(level.rms, len(r.measured)) for level, r in zip(self.data.levels, self.replays, strict=True)
-                  if r.place == place]  # fmt: skip
-            square = sum(rms**2 * n for rms, n in of) / sum(n for _, n in of)
-            noise[self.model.plant.outputs[place].name] = float(np.sqrt(square))
-        return noise
+        """What noise leaves of each output that is recorded, by its name [its unit]."""
+        return self.pooled([level.total for level in self.data.levels])
+
+    def pooled(self, sizes: Sequence[float]) -> dict[str, float]:
+        """Return the rms of each output that is recorded, all samples together; sizes: rms of each signal."""
+        squares: dict[str, list[Array]] = {}
+        for replay, size in zip(self.replays, sizes, strict=True):
+            squares.setdefault(self.model.plant.outputs[replay.place].name, []).append(
+                np.full(len(replay.measured), size**2))  # fmt: skip
+        in_order = [o.name for o in self.model.plant.outputs if o.name in squares]
+        return {name: float(np.sqrt(np.mean(np.concatenate(squares[name])))) for name in in_order}
 
     @cached_property
     def memory(self) -> dict[int, float]:
@@ -225,8 +229,12 @@ def holdout_residuals(fit: Fit, records: tuple[Record, ...], library: Library) -
         return None
     plant, tolerances = library.declared.plant, library.tolerances
     records = tuple(moved_record(r, plant, fit.constants) for r in records)
-    data = whitened(records, plant, library.data)
+    data = whitened(records, plant, library.data if library.as_read is None else library.as_read)
     ready = calibrated_replays(records, fit.model, fit.records.space, fit.values)
+    if library.as_read is not None:
+        noise = pooled_noise(library.as_read.records)
+        data = data.with_levels(levels_with_inputs(data.levels, ready, fit.candidate, noise))
+        ready = with_each(ready, lambda one: replace(one, record=estimated(one.record, noise)))
     problem = WhiteRecords(ready, fit.records.space, data)
     residual, slopes = problem.residual_and_slopes(fit.z)
     within = fit.products(tolerances)
@@ -286,7 +294,8 @@ def chance(ratio: float, free: float, known: float) -> float:
 def size_tests(seen: Residuals) -> Iterator[Finding]:
     """Compare mean squares with the noise: of all samples, of each record, before and after each switch.
 
-    Of the residual as it is, not whitened: a filter that is known from a short rest is not trusted with its size.
+    Of the residual as it is, not whitened: a filter that is known from a short rest is not trusted with its size. Where
+    noise of the inputs moves the machine, nothing but the whitened one has a size.
     Either mean square counts as many samples as are independent for it.
     """
     if not seen.data.known:
@@ -295,7 +304,7 @@ def size_tests(seen: Residuals) -> Iterator[Finding]:
     rows, lengths = np.arange(n), np.diff(edges)
     records = {r.name: (rows >= a) & (rows < b) for r, (a, b) in zip(seen.replays, pairwise(edges), strict=True)}
     square = np.repeat([level.rms**-2.0 for level in levels], lengths) * np.concatenate(seen.raw) ** 2
-    square = seen.residual**2 if seen.doubted else square
+    square = seen.residual**2 if seen.doubted or seen.data.holds_inputs else square
     counted = np.repeat([level.n_power / level.n_samples for level in levels], lengths)
     known, share = min(level.n_power for level in levels), 1.0 - seen.basis.shape[1] / n
     whole = {"all records": np.ones(n, dtype=np.bool_)}
@@ -402,7 +411,7 @@ def band_tests(seen: Residuals) -> Iterator[Finding]:
     rest itself shows the spectrum.
     Where the rest hums, frequencies near by are left out: a line does not scatter as noise does.
     """
-    coloured = not seen.doubted and seen.data.rests_have_colour
+    coloured = not (seen.doubted or seen.data.holds_inputs) and seen.data.rests_have_colour
     hum = mains_hum(seen)
     white = [level.rms * r for level, r in zip(seen.data.levels, seen.renewed, strict=True)]
     raw = [bridged(x, r) for x, r in zip(seen.raw, seen.replays, strict=True)] if coloured else white

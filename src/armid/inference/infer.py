@@ -13,17 +13,18 @@ from armid.engine import along
 from armid.errors import ArmidError, nearest
 from armid.estimation.constants import NAMED
 from armid.estimation.information import NORMAL_95
+from armid.estimation.input_noise import estimated, levels_with_inputs, pooled_noise
 from armid.estimation.least_squares import Estimates, descend, held_by_bound, spread_starts, with_fitted_starts
 from armid.estimation.noise_model import levels_left
 from armid.inference.candidates import constant_effects
 from armid.inference.carry_over import predicting_best
-from armid.inference.checks import train_residuals
+from armid.inference.checks import is_significant, train_residuals
 from armid.inference.decisions import LISTED, MENTIONED, calibration
 from armid.inference.evidence import Expansion, expansion_of
 from armid.inference.hypothesis import Hypotheses, Hypothesis
 from armid.inference.kinds import effects
 from armid.inference.library import Library, library_of
-from armid.inference.model import ROUGHLY, Fit, accurate, fit_from
+from armid.inference.model import ROUGHLY, Fit, accurate, fit_from, start_of
 from armid.inference.posterior import CONSTANTS, Posterior, posterior, spread
 from armid.inference.search import Exploration, explore, without_denied
 from armid.inference.whitening import WhiteRecords, whitened
@@ -268,7 +269,7 @@ def prepared(
     library = replace(library, reach=REACH, priors=chances, known=known)
     problem = library.problem(())
     library = library.about(with_fitted_starts(problem.replays, problem.space), library.misfit)
-    library, declared = with_noise(*with_scales(library))
+    library, declared = with_input_noise(*with_noise(*with_scales(library)))
     return replace(library, doubles=effects.doubles(declared, library)), declared
 
 
@@ -278,8 +279,30 @@ def infer(library: Library, declared: Fit) -> Inference:
     Each hypothesis (an effect, a fault of one record, a drift, a signal without a form) is a block of further unknowns
     with a prior. Models are explored in Occam's window; `evidence` says how a model gets its probability.
     """
+    inference = inferred(library, declared)
+    if library.as_read is None:
+        return inference
+    fit, exact = inference.exploration.fits[inference.in_force], library.with_data(library.as_read)
+    problem = exact.problem(fit.active, fit.values)
+    if fit_from(problem, fit.active, [start_of(problem, fit.values)]).log_density > fit.log_density:
+        library.say("the inputs count as exact: the records are more probable so")
+        return inferred(exact, declared_again(exact, declared))
+    if fit.active and inference.posterior.probability("unknown") >= MENTIONED:
+        # the declared model may answer to its inputs quite otherwise
+        library.say("the same with the noise of the inputs as the best model answers to it")
+        library = with_measured_inputs(exact, fit)
+        return inferred(library, declared_again(library, declared))
+    return inference
+
+
+def inferred(library: Library, declared: Fit) -> Inference:
     exploration = explore(library, declared)
     return Inference(exploration, posterior(exploration))
+
+
+def declared_again(library: Library, declared: Fit) -> Fit:
+    """Return the declared model fitted to other data of the same records."""
+    return accurate(fit_from(library.problem(()), (), [declared.z]), library)
 
 
 def declared_fit(library: Library) -> Fit:
@@ -333,8 +356,28 @@ def with_noise(library: Library, declared: Fit) -> tuple[Library, Fit]:
     levels = levels_left(library.data.levels, seen.replays, seen.raw)
     if levels == library.data.levels:
         return library, declared
-    library = replace(library, data=library.data.with_levels(levels), _problems={})
-    return library, accurate(fit_from(library.problem(()), (), [declared.z]), library)
+    library = library.with_data(library.data.with_levels(levels))
+    return library, declared_again(library, declared)
+
+
+def with_input_noise(library: Library, declared: Fit) -> tuple[Library, Fit]:
+    """Return the library whose inputs count as measured with noise, where this may show, and the declared fit."""
+    if not pooled_noise(library.data.records) or not is_significant(declared):
+        return library, declared
+    library.say("taking the measured inputs as measured with noise")
+    library = with_measured_inputs(library, declared)
+    return library, declared_again(library, declared)
+
+
+def with_measured_inputs(library: Library, fit: Fit) -> Library:
+    """Return a library whose inputs are estimates of what was measured, with the noise to which a fit answers.
+
+    library: whose inputs count as exact. fit: of any model, to these records.
+    """
+    data, noise = library.data, pooled_noise(library.data.records)
+    levels = levels_with_inputs(data.levels, fit.records.replays, fit.candidate, noise)
+    records = tuple(estimated(r, noise) for r in data.records)
+    return library.with_data(replace(data.with_levels(levels), records=records), as_read=data)
 
 
 def rescaled(library: Library, declared: Fit) -> Library:

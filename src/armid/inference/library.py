@@ -39,6 +39,7 @@ class Library:
     them, of the declared model and of candidates alike. tolerances: of the constants, relative. misfit: rms residual of
     the best model so far in units of the noise, at least 1. say: called with a sentence before something that takes
     long. priors: probabilities of effects before the records. known: mean and deviation of parameters, SI, likewise.
+    as_read: the data whose inputs count as exact, where in `data` they count as measured with noise, else None.
     reach: by which factor strengths that scale with the machine may exceed their declared range. widened: ranges of
     strengths of the declared model that were too narrow. doubles: effects that do what a free parameter of the declared
     model does, and its name; they are not tried.
@@ -57,6 +58,7 @@ class Library:
     misfit: float = 1.0
     priors: Mapping[str, float] = field(default_factory=dict)
     known: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    as_read: WhitenedData | None = None
     reach: float = 1.0
     widened: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     doubles: Mapping[EffectKey, str] = field(default_factory=dict)
@@ -116,6 +118,10 @@ class Library:
             data = replace(self.data, records=tuple(ready.record for ready in by_record(replays)))
             return replace(self, data=data, misfit=misfit, _problems={})
         return self if 0.5 < misfit / self.misfit < 2.0 else replace(self, misfit=misfit, _problems={})
+
+    def with_data(self, data: WhitenedData, as_read: WhitenedData | None = None) -> "Library":
+        """Return the library with other data of the same records."""
+        return replace(self, data=data, as_read=as_read, _problems={})
 
     def recalibrated(self, active: Active, values: Mapping[str, float], misfit: float) -> WhiteRecords | None:
         """Return the problem with finer steps where those at hand are too coarse at some values, else None.

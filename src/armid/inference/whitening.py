@@ -110,6 +110,11 @@ class WhitenedData:
         """Whether a rest tells a colour of the noise, hence its spectrum too."""
         return any(level.known and not level.is_white for level in self.levels)
 
+    @property
+    def holds_inputs(self) -> bool:
+        """Whether noise of the inputs counts."""
+        return any(level.holds_inputs for level in self.levels)
+
     def n_noise(self, otherwise: float) -> float:
         """Return from how many independent samples the noise of slow signals is known; `otherwise` where from none."""
         return float(min((level.n_slow for level in self.levels if level.known), default=otherwise))

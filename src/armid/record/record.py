@@ -72,7 +72,8 @@ class Piece:
     start_deviation: constant (`start_position`, `start_speed`) -> standard deviation of its measured value, SI; empty
     for a machine that starts from its declared state. n_spent: first samples that gave the start of a record that is
     held out, so that they judge nothing. shown_start: constant -> its measured value, SI, where a fit estimates these
-    constants with the parameters; correction: what does so, None before.
+    constants with the parameters; correction: what does so, None before. smoothed: input -> what is known of it,
+    where the manoeuvre holds the best estimate of what was measured (see estimation/input_noise.py).
     """
 
     manoeuvre: Manoeuvre
@@ -82,6 +83,7 @@ class Piece:
     n_spent: int = 0
     shown_start: Mapping[str, float] = field(default_factory=dict)
     correction: StartCorrection | None = None
+    smoothed: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def duration(self) -> float:
