@@ -229,6 +229,14 @@ def rounding_of_input(values: Array) -> float:
     return step if np.mean((steps != 0.0) & np.append(True, np.diff(steps) != 0.0)) >= CHANGING else 0.0
 
 
+def quiet_rows(values: Array) -> int:
+    """Return for how many rows an input is noise about a mean from the first one on, 0 where for fewer than 50."""
+    n, longest = FEWEST_REST_SAMPLES, 0
+    while n <= values.size and stands_still(values[:n], 0.0, False):
+        n, longest = ceil(LONGER_REST * n), n
+    return longest
+
+
 def rest_between(values: Array, still: Mask, is_speed: bool) -> Array:
     """Return the longest rest between motions, empty without one of 50 samples.
 
