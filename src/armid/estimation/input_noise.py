@@ -24,9 +24,10 @@ DRAWS, SEED = 16, 1
 NEIGHBOURS, ROUNDS = 9, 40
 # Least variance of a second difference, in that of the noise.
 LEAST = 1e-12
-# Past samples, of the noise and of what each adds, that tell the next; those of a first, long autoregression. Samples
-# of a piece that tell of it.
-PAST, LONG_PAST, FEWEST = 3, 30, 100
+# Samples of a piece that tell of its noise; bands of its spectrum, each as wide as its frequency asks for.
+FEWEST, BANDS = 100, 100
+# Where the search for a spectrum begins: inverse hyperbolic tangents of the memory of noise, and of what it adds.
+START = np.array([2.0, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,32 +187,48 @@ def levels_with_inputs(
 def averages_of(parts: Sequence[Array]) -> tuple[Array, Array, float]:
     """Return the autoregression with averages of noise, and the rms of what each sample adds.
 
-    What a long autoregression leaves stands in for what each sample adds (Hannan and Rissanen 1982,
-    doi:10.1093/biomet/69.1.81).
+    Its spectrum is the likeliest one for the mean periodogram (Whittle 1953), of the order that the Bayesian criterion
+    asks for: a machine that turns freely is of first order, one that swings of second.
     """
-    long, _ = regressed([(x, [x]) for x in parts], LONG_PAST)
-    added = [np.convolve(x, [1.0, *-long])[: x.size] for x in parts]
-    found, innovation = regressed([(x[LONG_PAST:], [x[LONG_PAST:], e[LONG_PAST:]])
-                                   for x, e in zip(parts, added, strict=True)], PAST)  # fmt: skip
-    # averages that cannot be undone have the spectrum of those with their roots inside the circle
-    roots = np.roots([1.0, *found[PAST:]])
-    outside = np.abs(roots) > 1.0
-    innovation *= float(np.prod(np.abs(roots[outside])))
-    roots[outside] = 1.0 / roots[outside].conj()
-    return found[:PAST], np.real(np.poly(roots))[1:], innovation
+    from scipy.optimize import minimize  # slow to load, and commands without noisy inputs do without it
+
+    spectra = [spectrum(x) for x in parts]
+    frequency, power = (np.concatenate(each) for each in zip(*spectra, strict=True))
+    place = np.searchsorted(np.geomspace(frequency.min(), 0.5, BANDS), frequency)
+    n = np.bincount(place)
+    frequency, power = (np.bincount(place, each)[n > 0] / n[n > 0] for each in (frequency, power))
+    share = n[n > 0] / np.sum(n)
+
+    def rational(partial: Array) -> tuple[Array, Array, Array, float]:
+        """Return both polynomials of partial correlations, the shape of the spectrum and its size."""
+        both = polynomial(np.tanh(partial[: partial.size // 2])), polynomial(np.tanh(partial[partial.size // 2 :]))
+        waves = np.exp(-2j * np.pi * np.outer(frequency, np.arange(len(both[0]))))
+        shape = np.abs(waves @ both[1]) ** 2 / np.abs(waves @ both[0]) ** 2
+        return *both, shape, float(share @ (power / shape))
+
+    def cost(partial: Array) -> float:
+        *_, shape, size = rational(partial)
+        return float(np.log(size) + share @ np.log(shape))
+
+    tried, partial, length = list[tuple[float, Array]](), START, float(np.mean([x.size for x in parts]))
+    while not tried or tried[-1][0] == min(tried, key=lambda one: one[0])[0]:
+        found, order = minimize(cost, partial, method="BFGS"), partial.size // 2
+        tried.append((length * found.fun + 2 * order * np.log(length), found.x))
+        partial = np.insert(found.x, [order, 2 * order], 0.0)
+    past, added, _, size = rational(min(tried, key=lambda one: one[0])[1])
+    return -past[1:], added[1:], float(np.sqrt(size))
 
 
-def regressed(pairs: Sequence[tuple[Array, Sequence[Array]]], past: int) -> tuple[Array, float]:
-    """Return the weights of past samples of some signals that tell the next of another best, and the rms of the rest.
+def spectrum(values: Array) -> tuple[Array, Array]:
+    """Return frequencies above 0, in 1/samples, and the tapered periodogram there."""
+    taper = np.hanning(values.size + 2)[1:-1]
+    power = np.abs(np.fft.rfft(taper * values)) ** 2 / float(taper @ taper)
+    return np.asarray(np.fft.rfftfreq(values.size)[1:], dtype=np.float64), np.asarray(power[1:])
 
-    pairs: values, (n_samples,), and the signals, each as long.
-    """
-    products, n = [], 0
-    for values, signals in pairs:
-        lags = [s[past - k : s.size - k] for s in signals for k in range(1, past + 1)]
-        columns = np.array([*lags, values[past:]])
-        products.append(columns @ columns.T)
-        n += columns.shape[1]
-    gram = np.sum(products, axis=0)
-    weights = np.linalg.lstsq(gram[:-1, :-1], gram[:-1, -1], rcond=None)[0]
-    return weights, float(np.sqrt(max(gram[-1, -1] - weights @ gram[:-1, -1], 0.0) / n))
+
+def polynomial(partial: Array) -> Array:
+    """Return 1 - sum c_k z^k with all roots outside the unit circle, of partial correlations (Durbin and Levinson)."""
+    terms = np.empty(0)
+    for correlation in partial:
+        terms = np.append(terms - correlation * terms[::-1], correlation)
+    return np.append(1.0, -terms)

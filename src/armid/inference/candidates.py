@@ -54,7 +54,7 @@ def declared_keys(active: Iterable[EffectKey]) -> set[EffectKey]:
 
 
 def constant_effects(rough: Mapping[str, float]) -> dict[str, Effect]:
-    """Return an effect for each constant or parameter that is known roughly; rough: name -> relative half-range.
+    """Return an effect for each constant or parameter that is known roughly; rough: name -> relative deviation.
 
     The plant has to know them roughly, too (`Plant.known_roughly`).
     """

@@ -18,7 +18,18 @@ import numpy as np
 from armid.engine import STANDARD, Calibration, Schedule, Simulation, accuracy_against, probes, simulate
 from armid.engine.calibrate import ALLOWED, MARGIN, difference, switch_weights
 from armid.estimation.least_squares import side_by_side
-from armid.inference.candidates import PROBE, Active, EffectKey, bump_at, bundled, compiled, declared_keys, idle, joined
+from armid.inference.candidates import (
+    ERROR_OF,
+    PROBE,
+    Active,
+    EffectKey,
+    bump_at,
+    bundled,
+    compiled,
+    declared_keys,
+    idle,
+    joined,
+)
 from armid.inference.whitening import WhitenedData, WhiteRecords
 from armid.model import EFFECTS, Array, Effect, Manoeuvre, Model, Parameter, distinct
 from armid.model.parameter import powers_of
@@ -27,6 +38,8 @@ from armid.problem.space import Space, space_of
 from armid.problem.starts import fits_starts
 from armid.record import Override, Record
 
+# How many standard deviations a constant may be off; its sign stays.
+DEVIATIONS, LEAST_ERROR = 3.0, -0.95
 S = TypeVar("S")
 T = TypeVar("T")
 
@@ -187,16 +200,22 @@ class Library:
             elif mine is not None and mine.free_shape and name in self.fixed_shapes(mine):
                 space = space.with_bounds(name, parameter.low, parameter.high)
             elif self.reach > 1.0 and mine is not None and name in space.free_names and name in self.scaled_strengths:
-                space = space.with_bounds(name, self.reach * parameter.low, self.reach * parameter.high)
+                space = space.with_bounds(name, *self.box_of(parameter))
         return space
+
+    def box_of(self, parameter: Parameter) -> tuple[float, float]:
+        """Return how far a strength may be searched whose declared range is a size to expect."""
+        if powers_of(parameter.unit):
+            return self.reach * parameter.low, self.reach * parameter.high
+        return max(DEVIATIONS * parameter.low, LEAST_ERROR), DEVIATIONS * parameter.high
 
     @cached_property
     def scaled_strengths(self) -> frozenset[str]:
-        """Names of strengths in units of the machine's scales whose range the user did not give."""
+        """Names of strengths in units of the machine's scales, and of errors, whose range the user did not give."""
         effects = [(e.name, e) for e in self.declared.effects]
         effects += [(key.compiled, effect) for key, effect in self.candidates.items()]
         names = (f"{name}.{p.name}" for name, effect in effects for p in effect.parameters
-                 if p.null == 0.0 and p.fixed is None and powers_of(p.unit))  # fmt: skip
+                 if p.null == 0.0 and p.fixed is None and (powers_of(p.unit) or name.startswith(ERROR_OF)))  # fmt: skip
         return frozenset(names) - {*self.bounds, *self.fixed, *self.overrides}
 
     def log_odds(self, effect: str, default: float) -> float:

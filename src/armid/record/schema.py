@@ -223,7 +223,7 @@ HOLD = key(one_of("linear", "zero"), "'linear' or 'zero'", "How an input runs be
 CONSTANTS = key(table_of(number), "a finite number in SI", "Constants of the plant, by name.")
 TOLERANCES = key(
     table_of(share), "a share from 0 to below 1",
-    "How well a constant is known, as a share of its value; `default` holds for those that are not named.",
+    "Standard deviation of a constant, as a share of its value; `default` holds for those that are not named.",
 )  # fmt: skip
 LOST = key(share, "a share from 0 to below 1", "Share of a record that may be invalid: clipped, frozen or wild.")
 INPUTS = key(table_of(text), "the name of a column", "Which column of the CSV file brings an input of the plant.")
