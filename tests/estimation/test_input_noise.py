@@ -7,10 +7,11 @@ import pytest
 
 from armid import close_loop, identify, read_campaign
 from armid.estimation.identify_document import answer, details_of, result_of
-from armid.estimation.input_noise import averages_of, moved_by_inputs, pooled_noise, smoothed
-from armid.estimation.noise_model import white_level
+from armid.estimation.input_noise import cosines, moved_by_inputs, pooled_noise, smoothed
+from armid.inference.infer import prepared
 from armid.loop import report_of
 from armid.loop.document import error_sentence
+from armid.model import Model
 from armid.record import write_campaign
 from armid.record.sensor import InputNoise, noise_of_input
 
@@ -114,13 +115,6 @@ def test_it_is_said_that_this_may_be_all_that_remains(tmp_path):
     assert "inputs" not in " ".join(answer(result_of(without), details_of(without)))
 
 
-def test_rounding_stays_while_the_rounded_value_stays():
-    values = np.repeat([0.0, 0.01, 0.02], 50) + np.random.default_rng(1).uniform(-0.004, 0.004, 150)
-    errors = InputNoise(step=0.01).rounding(values, np.random.default_rng(0))
-    assert len(np.unique(errors)) == 3
-    assert np.abs(errors).max() <= 0.005
-
-
 INPUTS = {
     "waves": np.sin(2.0 * np.pi * 0.5 * TIMES) + 0.4 * np.sin(2.0 * np.pi * 1.3 * TIMES),
     "staircase": np.repeat(np.random.default_rng(4).uniform(-1.0, 1.0, 12), 100),
@@ -144,28 +138,41 @@ def test_the_estimate_is_closer_than_the_column_and_knows_its_error(name):
     assert np.sqrt(np.mean(misses) / np.mean(claimed)) == pytest.approx(1.0, abs=0.25)
 
 
-def test_its_answer_is_turned_white():
-    """A random walk with noise of a sensor is an autoregression with one average, which is known (Harvey 1989, 2.4)."""
-    rng, step, noise = np.random.default_rng(3), 0.5, 1.0
-    parts = [np.cumsum(rng.normal(0.0, step, 4000)) + rng.normal(0.0, noise, 4000) for _ in range(6)]
-    terms, averages, innovation = averages_of(parts)
-    ratio = (step / noise) ** 2
-    gain = 0.5 * (np.sqrt(ratio**2 + 4.0 * ratio) - ratio)
-    assert innovation == pytest.approx(noise / np.sqrt(1.0 - gain), rel=0.02)
-    level = replace(white_level(noise, 100), terms=terms, averages=averages, innovation=innovation)
-    white = level.white(parts[0], [len(parts[0])])
-    assert np.std(white) == pytest.approx(1.0, rel=0.05)
-    for lag in (1, 2, 5, 20):
-        assert abs(np.mean(white[lag:] * white[:-lag])) < 4.0 / np.sqrt(len(white))
+@pytest.mark.parametrize("step", [0.0, 0.05])
+def test_the_covariance_of_its_error_is_that_of_drawn_columns(step):
+    """Two waves are enough: a slow one, along which rounding errors add up, and a fast one."""
+    waves, true = cosines(len(TIMES), np.array([3, 200])), 0.5 * np.sin(2.0 * np.pi * 0.2 * TIMES)
+    noise = InputNoise(rms=0.0 if step else 0.03, step=step)
+    rng = np.random.default_rng(1)
+    if step:
+        known = smoothed(step * np.rint(true / step), noise)
+        begins = np.flatnonzero(np.diff(np.rint(known.values / step), prepend=np.nan) != 0.0)
+        runs = np.repeat(np.arange(len(begins)), np.diff(np.append(begins, len(TIMES))))
+        columns = step * (rng.random((len(begins), 400))[runs] - 0.5)
+    else:
+        known = smoothed(true + rng.normal(0.0, 0.03, len(TIMES)), noise)
+        columns = rng.normal(0.0, 0.03, (len(TIMES), 400))
+    followed = waves.T @ known.solved(columns / known.variance)
+    covariance = known.covariance(waves, step)
+    # the error is what the estimate follows of the noise, and what it leaves of the input
+    least = np.mean(followed**2, axis=1)
+    assert np.all(np.diag(covariance) > 0.8 * least)
+    assert covariance[0, 0] == pytest.approx(least[0], rel=0.25)
 
 
-def test_pieces_are_turned_white_each_from_its_first_sample_on():
-    level = replace(white_level(1.0, 100), terms=np.array([1.0]), averages=np.array([-0.5]), innovation=2.0)
-    piece = np.random.default_rng(2).normal(size=50)
-    both = level.white(np.concatenate([piece, piece]), [50, 50])
-    assert both[:50] == pytest.approx(both[50:])
-    assert both[0] == pytest.approx(piece[0] / 2.0)
-    assert both[1] == pytest.approx((piece[1] - piece[0]) / 2.0 + 0.5 * both[0])
+def test_what_a_right_model_leaves_is_turned_white(tmp_path):
+    """Of many torques with noise on the same motion; whitened, the misfit of the true model is noise."""
+    chi2, lags = [], []
+    for seed in range(8):
+        records = campaign(tmp_path / f"axis_{seed}", lambda drive, _, s=seed: noisy(drive, np.random.default_rng(s)))
+        library, declared = prepared(Model(records.plant), records, candidates={})
+        data, z = library.data, declared.records.shares(np.array([INERTIA, DAMPING]))
+        assert data.holds_inputs
+        left = declared.records.plain.residuals(z)[0]
+        chi2.append(float(np.mean(left**2)))
+        lags += [np.mean(x[lag:] * x[:-lag]) for x in data.by_record(left) for lag in (1, 5, 25)]
+    assert np.mean(chi2) == pytest.approx(1.0, abs=0.15)
+    assert abs(np.mean(lags)) < 0.03
 
 
 @pytest.mark.slow

@@ -5,29 +5,27 @@ right model leaves looks like a random walk. What drove the machine was smoother
 best estimate, and the error of that, as the machine answers to it, is part of the noise of each output.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.ndimage import uniform_filter1d
 
-from armid.estimation.noise_model import NoiseModel
 from armid.model import Array
-from armid.problem.problem import Replay, by_record
+from armid.problem.problem import ReadyRecord, Replay, by_record
 from armid.record import Piece, Record
 from armid.record.sensor import InputNoise
 
-# Simulations of each record, and the seed of the errors.
+# Drawn errors, and their seed.
 DRAWS, SEED = 16, 1
 # Second differences that share a size, and steps towards these sizes.
 NEIGHBOURS, ROUNDS = 9, 40
 # Least variance of a second difference, in that of the noise.
 LEAST = 1e-12
-# Samples of a piece that tell of its noise; bands of its spectrum, each as wide as its frequency asks for.
-FEWEST, BANDS = 100, 100
-# Where the search for a spectrum begins: inverse hyperbolic tangents of the memory of noise, and of what it adds.
-START = np.array([2.0, 1.0])
+# Cosines that are tried at once; sum of squares of an answer, in units of the noise, that a sensor does not see.
+BLOCK, UNSEEN = 16, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,11 +58,22 @@ class Smoothed:
         bent = np.sqrt(self.bends)[:, np.newaxis] * rng.standard_normal((self.bends.size, n))
         for first, weight in enumerate((1.0, -2.0, 1.0)):
             drawn[first : first + self.bends.size] += weight * bent
-        return np.asarray(cho_solve_banded((self.factor, False), drawn))
+        return self.solved(drawn)
 
-    def followed(self, errors: Array) -> Array:
-        """Return how the estimate follows errors of the column, (n_samples,)."""
-        return np.asarray(cho_solve_banded((self.factor, False), errors / self.variance))
+    def covariance(self, waves: Array, step: float) -> Array:
+        """Return the covariance of the error's parts along orthonormal waves, (n_samples, n).
+
+        step: of the sensor. What it rounds away stays while its value stays, and the estimate follows.
+        """
+        known = self.solved(waves)
+        if not step:
+            return waves.T @ known
+        begins = np.flatnonzero(np.diff(np.rint(self.values / step), prepend=np.nan) != 0.0)
+        rounded = np.add.reduceat(known, begins) / self.variance
+        return waves.T @ known + step**2 / 12.0 * rounded.T @ rounded
+
+    def solved(self, columns: Array) -> Array:
+        return np.asarray(cho_solve_banded((self.factor, False), columns))
 
 
 def smoothed(values: Array, noise: InputNoise) -> Smoothed:
@@ -108,45 +117,63 @@ def estimated(record: Record, noise: Mapping[str, InputNoise]) -> Record:
     return record.with_pieces(driven)
 
 
-def with_errors(record: Record, noise: Mapping[str, InputNoise], rng: np.random.Generator) -> Record:
-    """Return a record that holds estimates of its inputs with drawn errors of these.
-
-    What a coarse sensor rounds away stays while its value stays: the estimate follows it.
-    """
-
-    def driven(piece: Piece) -> Piece:
-        drawn = {}
-        for name, of in noise.items():
-            known, values = piece.smoothed[name], piece.manoeuvre.inputs[name]
-            rounded = known.followed(of.rounding(known.values, rng)) if of.step else 0.0
-            drawn[name] = values + (known.errors(1, rng)[:, 0] + rounded)[: values.size]
-        return with_inputs(piece, drawn)
-
-    return record.with_pieces(driven)
-
-
 def with_inputs(piece: Piece, inputs: Mapping[str, Array]) -> Piece:
     return replace(piece, manoeuvre=replace(piece.manoeuvre, inputs={**piece.manoeuvre.inputs, **inputs}))
 
 
-def errors_by_inputs(
-    replays: Sequence[Replay], candidate: Array, noise: Mapping[str, InputNoise]
-) -> Iterator[tuple[Replay, Array]]:  # fmt: skip
-    """Yield what drawn errors of the measured inputs do to each signal, (DRAWS, n_samples).
+def answers(
+    ready: ReadyRecord, signals: Sequence[Replay], candidate: Array, noise: Mapping[str, InputNoise],
+    sizes: Sequence[float],
+) -> list[list[Array]]:  # fmt: skip
+    """Return how signals of a record answer to the errors of its inputs: of each piece an array for each signal.
 
-    candidate: whole, SI, (n_parameters,).
+    Its columns, (n_samples, n), are the answers to independent errors of one standard deviation. The errors are sums of
+    cosines over the piece, from the slowest on until the sensors do not see the answers: each costs a simulation.
+    candidate: whole, SI. noise: of the inputs. sizes: noise of each signal's sensor, rms [its unit].
     """
-    rng, whole = np.random.default_rng(SEED), candidate[np.newaxis]
-    for ready, signals in by_record(replays).items() if noise else ():
-        record = estimated(ready.record, noise)
-        exact = replace(ready, record=record).runs(whole)
-        runs = [replace(ready, record=with_errors(record, noise, rng)).runs(whole) for _ in range(DRAWS)]
-        for r in signals:
-            yield r, np.concatenate([r.seen(run) for run in runs]) - r.seen(exact)
+    record, whole = estimated(ready.record, noise), candidate[np.newaxis]
+    exact = [r.seen(replace(ready, record=record).runs(whole))[0] for r in signals]
+    found: list[list[list[Array]]] = [[[] for _ in signals] for _ in record.pieces]
+    for name, of in noise.items():
+        known = [piece.smoothed[name] for piece in record.pieces]
+        most, n, columns = min(one.values.size for one in known), 0, [list[Array]() for _ in signals]
+        while n < most:
+            waves = [cosines(one.values.size, np.arange(n, min(n + BLOCK, most))) for one in known]
+            deviations = [np.sqrt(np.diag(one.covariance(w, of.step))) for one, w in zip(known, waves, strict=True)]
+            seen = 0.0
+            for k in range(waves[0].shape[1]):
+                changes = [w[:, k] * d[k] for w, d in zip(waves, deviations, strict=True)]
+                run = replace(ready, record=with_changes(record, name, changes)).runs(whole)
+                for column, r, at_rest, size in zip(columns, signals, exact, sizes, strict=True):
+                    column.append(r.seen(run)[0] - at_rest)
+                    seen = max(seen, float(np.sum(column[-1] ** 2)) / size**2)
+            n += waves[0].shape[1]
+            if seen < UNSEEN:
+                break
+        for i, one in enumerate(known):
+            covariance = one.covariance(cosines(one.values.size, np.arange(n)), of.step)
+            root = np.linalg.cholesky(covariance / np.sqrt(np.outer(np.diag(covariance), np.diag(covariance))))
+            for j, r in enumerate(signals):
+                edges = np.cumsum([0, *r.record.lengths])
+                found[i][j].append(np.array(columns[j])[:, edges[i] : edges[i + 1]].T @ root)
+    return [[np.hstack(each) for each in piece] for piece in found]
+
+
+def cosines(n_samples: int, numbers: NDArray[np.int64]) -> Array:
+    """Return orthonormal cosines over some samples, (n_samples, n), the first of which is a constant."""
+    waves = np.cos(np.pi * np.outer(np.arange(n_samples) + 0.5, numbers) / n_samples)
+    return np.asarray(waves * np.where(numbers == 0, 1.0, np.sqrt(2.0)) / np.sqrt(n_samples))
+
+
+def with_changes(record: Record, name: str, changes: Sequence[Array]) -> Record:
+    """Return a record with changes of an input, of each piece one that is as long or longer."""
+    pairs = zip(record.pieces, changes, strict=True)
+    pieces = ((piece, piece.manoeuvre.inputs[name], change) for piece, change in pairs)
+    return replace(record, pieces=tuple(with_inputs(p, {name: u + change[: u.size]}) for p, u, change in pieces))
 
 
 def moved_by_inputs(replays: Sequence[Replay], candidate: Array) -> dict[str, float]:
-    """Return how far noise of the inputs moves each output, from simulations with drawn errors.
+    """Return how far noise of the inputs moves each output, to first order.
 
     Parameters
     ----------
@@ -160,75 +187,10 @@ def moved_by_inputs(replays: Sequence[Replay], candidate: Array) -> dict[str, fl
     dict
         Output -> rms [its unit]; empty where all inputs are commands.
     """
-    squares: dict[str, list[Array]] = {}
-    for r, moved in errors_by_inputs(replays, candidate, pooled_noise([ready.record for ready in by_record(replays)])):
-        squares.setdefault(r.model.plant.outputs[r.place].name, []).append(np.ravel(moved) ** 2)
+    noise, squares = pooled_noise([ready.record for ready in by_record(replays)]), dict[str, list[Array]]()
+    for ready, signals in by_record(replays).items() if noise else ():
+        sizes = [r.record.noise.rms for r in signals]
+        for piece in answers(ready, signals, candidate, noise, sizes):
+            for r, columns in zip(signals, piece, strict=True):
+                squares.setdefault(r.model.plant.outputs[r.place].name, []).append(np.sum(columns**2, axis=1))
     return {name: float(np.sqrt(np.mean(np.concatenate(values)))) for name, values in squares.items()}
-
-
-def levels_with_inputs(
-    levels: Sequence[NoiseModel], replays: Sequence[Replay], candidate: Array, noise: Mapping[str, InputNoise]
-) -> tuple[NoiseModel, ...]:  # fmt: skip
-    """Return the noise of each signal with what noise of the inputs adds to it at a candidate.
-
-    That of a record in pieces too short to tell stays.
-    """
-    own, rng = dict(zip(replays, levels, strict=True)), np.random.default_rng(SEED)
-    for r, moved in errors_by_inputs(replays, candidate, noise):
-        whole = [part + own[r].drawn(part.size, rng) for part in moved]
-        parts = [x for part in whole for x in np.split(part, np.cumsum(r.record.lengths)[:-1]) if x.size > FEWEST]
-        if parts:
-            terms, averages, innovation = averages_of(parts)
-            rms = float(np.sqrt(np.mean(moved**2)))
-            own[r] = replace(own[r], terms=terms, averages=averages, innovation=innovation, moved=rms)
-    return tuple(own[r] for r in replays)
-
-
-def averages_of(parts: Sequence[Array]) -> tuple[Array, Array, float]:
-    """Return the autoregression with averages of noise, and the rms of what each sample adds.
-
-    Its spectrum is the likeliest one for the mean periodogram (Whittle 1953), of the order that the Bayesian criterion
-    asks for: a machine that turns freely is of first order, one that swings of second.
-    """
-    from scipy.optimize import minimize  # slow to load, and commands without noisy inputs do without it
-
-    spectra = [spectrum(x) for x in parts]
-    frequency, power = (np.concatenate(each) for each in zip(*spectra, strict=True))
-    place = np.searchsorted(np.geomspace(frequency.min(), 0.5, BANDS), frequency)
-    n = np.bincount(place)
-    frequency, power = (np.bincount(place, each)[n > 0] / n[n > 0] for each in (frequency, power))
-    share = n[n > 0] / np.sum(n)
-
-    def rational(partial: Array) -> tuple[Array, Array, Array, float]:
-        """Return both polynomials of partial correlations, the shape of the spectrum and its size."""
-        both = polynomial(np.tanh(partial[: partial.size // 2])), polynomial(np.tanh(partial[partial.size // 2 :]))
-        waves = np.exp(-2j * np.pi * np.outer(frequency, np.arange(len(both[0]))))
-        shape = np.abs(waves @ both[1]) ** 2 / np.abs(waves @ both[0]) ** 2
-        return *both, shape, float(share @ (power / shape))
-
-    def cost(partial: Array) -> float:
-        *_, shape, size = rational(partial)
-        return float(np.log(size) + share @ np.log(shape))
-
-    tried, partial, length = list[tuple[float, Array]](), START, float(np.mean([x.size for x in parts]))
-    while not tried or tried[-1][0] == min(tried, key=lambda one: one[0])[0]:
-        found, order = minimize(cost, partial, method="BFGS"), partial.size // 2
-        tried.append((length * found.fun + 2 * order * np.log(length), found.x))
-        partial = np.insert(found.x, [order, 2 * order], 0.0)
-    past, added, _, size = rational(min(tried, key=lambda one: one[0])[1])
-    return -past[1:], added[1:], float(np.sqrt(size))
-
-
-def spectrum(values: Array) -> tuple[Array, Array]:
-    """Return frequencies above 0, in 1/samples, and the tapered periodogram there."""
-    taper = np.hanning(values.size + 2)[1:-1]
-    power = np.abs(np.fft.rfft(taper * values)) ** 2 / float(taper @ taper)
-    return np.asarray(np.fft.rfftfreq(values.size)[1:], dtype=np.float64), np.asarray(power[1:])
-
-
-def polynomial(partial: Array) -> Array:
-    """Return 1 - sum c_k z^k with all roots outside the unit circle, of partial correlations (Durbin and Levinson)."""
-    terms = np.empty(0)
-    for correlation in partial:
-        terms = np.append(terms - correlation * terms[::-1], correlation)
-    return np.append(1.0, -terms)

@@ -6,7 +6,7 @@ What a single column tells of its noise when it is read stands in record/sensor.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil
 from typing import TypeVar
@@ -40,9 +40,8 @@ class NoiseModel:
     """Hold the noise of the records of one sensor.
 
     rms: [unit of the records]. terms: autoregression e_t = w_t - sum a_k w_(t-k), (n_terms,), empty for white noise.
-    innovation: rms of e_t. head: turns the first n_terms samples white, (n_terms, n_terms). averages: where noise of
-    the inputs moves the machine too, w_t = e_t + sum b_k e_(t-k) + sum a_k w_(t-k), 0 before the first sample,
-    (n_averages,), else empty. `rms` is that of the sensor alone, moved: that by the inputs [unit of the records].
+    innovation: rms of e_t. head: turns the first n_terms samples white, (n_terms, n_terms). moved: rms by which noise
+    of the inputs moves the signal, 0 where it does not count [unit of the records].
     n_samples: samples at rest from which it is known, 0 where none were recorded: then `rms` comes from differences of
     the motion, and is a lower bound rather than a measurement. n_slow, n_power: of these, how many count as independent
     for slow signals, n/(1 + 2 sum rho), and for a mean square, n/(1 + 2 sum rho^2).
@@ -55,17 +54,11 @@ class NoiseModel:
     n_samples: int
     n_slow: float
     n_power: float
-    averages: Array = field(default_factory=lambda: np.empty(0))
     moved: float = 0.0
 
     @property
     def is_white(self) -> bool:
         return not len(self.terms)
-
-    @property
-    def holds_inputs(self) -> bool:
-        """Whether it is that of the inputs too."""
-        return len(self.averages) > 0
 
     @property
     def known(self) -> bool:
@@ -90,19 +83,10 @@ class NoiseModel:
         n, pieces = len(self.terms), []
         for start, end in pairwise(np.cumsum([0, *lengths])):
             piece = values[..., start:end]
-            past = np.concatenate([[1.0], self.averages])
-            filtered = lfilter(np.concatenate([[1.0], -self.terms]), past, piece, axis=-1) / self.innovation
-            if not self.holds_inputs:
-                filtered[..., :n] = piece[..., :n] @ self.head.T
+            filtered = lfilter(np.concatenate([[1.0], -self.terms]), [1.0], piece, axis=-1) / self.innovation
+            filtered[..., :n] = piece[..., :n] @ self.head.T
             pieces.append(filtered)
         return np.concatenate(pieces, axis=-1)
-
-    def drawn(self, n: int, rng: np.random.Generator) -> Array:
-        """Return drawn noise of the sensor, (n,)."""
-        from scipy.signal import lfilter
-
-        white = self.innovation * rng.standard_normal(n + MOST_LAGS)
-        return np.asarray(lfilter([1.0], np.concatenate([[1.0], -self.terms]), white)[MOST_LAGS:])
 
 
 def noise_levels(records: Sequence[Record], plant: Plant, others: Sequence[Record] = ()) -> tuple[NoiseModel, ...]:

@@ -13,11 +13,11 @@ from armid.engine import along
 from armid.estimation.constants import columns_of, moved_record, slopes_of_constants
 from armid.estimation.identify import JointErrors, campaign_errors
 from armid.estimation.information import start_changes
-from armid.estimation.input_noise import estimated, levels_with_inputs, pooled_noise
+from armid.estimation.input_noise import estimated, pooled_noise
 from armid.inference.decisions import CERTAIN, SIGNIFICANCE
 from armid.inference.library import Library, calibrated_replays
 from armid.inference.model import Fit, beyond, decomposed
-from armid.inference.whitening import WhitenedData, WhiteRecords, whitened
+from armid.inference.whitening import WhitenedData, WhiteRecords, whitened, with_answers
 from armid.model import Array, Model
 from armid.problem.problem import Replay, with_each
 from armid.record import Record
@@ -233,7 +233,7 @@ def holdout_residuals(fit: Fit, records: tuple[Record, ...], library: Library) -
     ready = calibrated_replays(records, fit.model, fit.records.space, fit.values)
     if library.as_read is not None:
         noise = pooled_noise(library.as_read.records)
-        data = data.with_levels(levels_with_inputs(data.levels, ready, fit.candidate, noise))
+        data = with_answers(data, ready, fit.candidate, noise)
         ready = with_each(ready, lambda one: replace(one, record=estimated(one.record, noise)))
     problem = WhiteRecords(ready, fit.records.space, data)
     residual, slopes = problem.residual_and_slopes(fit.z)

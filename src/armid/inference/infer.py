@@ -13,7 +13,7 @@ from armid.engine import along
 from armid.errors import ArmidError, nearest
 from armid.estimation.constants import NAMED
 from armid.estimation.information import NORMAL_95
-from armid.estimation.input_noise import estimated, levels_with_inputs, pooled_noise
+from armid.estimation.input_noise import estimated, pooled_noise
 from armid.estimation.least_squares import Estimates, descend, held_by_bound, spread_starts, with_fitted_starts
 from armid.estimation.noise_model import levels_left
 from armid.inference.candidates import constant_effects
@@ -27,11 +27,12 @@ from armid.inference.library import Library, library_of
 from armid.inference.model import ROUGHLY, Fit, accurate, fit_from, start_of
 from armid.inference.posterior import CONSTANTS, Posterior, posterior, spread
 from armid.inference.search import Exploration, explore, without_denied
-from armid.inference.whitening import WhiteRecords, whitened
+from armid.inference.whitening import WhiteRecords, whitened, with_answers
 from armid.model import EFFECTS, Array, Effect, Model
 from armid.model.effects.sensor import sensor_effects
 from armid.problem.space import Space
 from armid.record import Campaign
+from armid.report.document import inputs_act
 
 # By which factor strengths that scale with the machine may exceed their declared range.
 REACH = 16.0
@@ -287,12 +288,19 @@ def infer(library: Library, declared: Fit) -> Inference:
     if fit_from(problem, fit.active, [start_of(problem, fit.values)]).log_density > fit.log_density:
         library.say("the inputs count as exact: the records are more probable so")
         return inferred(exact, declared_again(exact, declared))
-    if fit.active and inference.posterior.probability("unknown") >= MENTIONED:
+    if fit.active and inference.posterior.probability("unknown") >= MENTIONED and shows_inputs(fit):
         # the declared model may answer to its inputs quite otherwise
         library.say("the same with the noise of the inputs as the best model answers to it")
         library = with_measured_inputs(exact, fit)
         return inferred(library, declared_again(library, declared))
     return inference
+
+
+def shows_inputs(fit: Fit) -> bool:
+    """Tell whether what noise of the inputs does shows in what a model leaves."""
+    seen = train_residuals(fit)
+    levels = zip(seen.data.levels, seen.raw, strict=True)
+    return any(inputs_act(level.rms, level.moved, float(np.sqrt(np.mean(left**2)))) for level, left in levels)
 
 
 def inferred(library: Library, declared: Fit) -> Inference:
@@ -375,9 +383,9 @@ def with_measured_inputs(library: Library, fit: Fit) -> Library:
     library: whose inputs count as exact. fit: of any model, to these records.
     """
     data, noise = library.data, pooled_noise(library.data.records)
-    levels = levels_with_inputs(data.levels, fit.records.replays, fit.candidate, noise)
+    with_noise = with_answers(data, fit.records.replays, fit.candidate, noise)
     records = tuple(estimated(r, noise) for r in data.records)
-    return library.with_data(replace(data.with_levels(levels), records=records), as_read=data)
+    return library.with_data(replace(with_noise, records=records), as_read=data)
 
 
 def rescaled(library: Library, declared: Fit) -> Library:

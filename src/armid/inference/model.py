@@ -58,10 +58,7 @@ class Fit:
     @property
     def log_density(self) -> float:
         """Log density of the measured samples, up to a constant of the records."""
-        data = self.records.data
-        scale = sum(float(sound.sum()) * np.log(level.innovation)
-                    for level, sound in zip(data.levels, data.by_record(data.sound), strict=True))  # fmt: skip
-        return float(-0.5 * self.chi2 - scale)
+        return -0.5 * self.chi2 - self.records.data.log_noise
 
     @property
     def n_free(self) -> int:

@@ -12,12 +12,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from armid.estimation.input_noise import answers
 from armid.estimation.least_squares import Estimates, LeastSquaresProblem
 from armid.estimation.noise_model import MISFIT, NoiseModel, noise_levels, sensor_of
 from armid.model import Array, Plant
-from armid.problem.problem import signals_of
+from armid.problem.problem import Replay, by_record, signals_of
 from armid.record import Record
-from armid.record.sensor import correlation_sum, new_share
+from armid.record.sensor import InputNoise, correlation_sum, new_share
 
 # Sum of squares, in units of the noise, from which on a signal is kept: the samples do not see smaller ones.
 SMALLEST = 0.1
@@ -46,6 +47,16 @@ class Cover:
         shares = 1.0 - 1.0 / np.sqrt(1.0 + self.sizes)
         return np.asarray(signals - ((signals @ self.basis) * shares) @ self.basis.T)
 
+    @property
+    def seen(self) -> "Cover":
+        """The cover without what the samples do not see."""
+        seen = self.sizes >= SMALLEST
+        return Cover(self.basis[:, seen], self.sizes[seen])
+
+    def of_rows(self, weights: Array) -> "Cover":
+        """Return the cover where samples have weights, (n_samples,)."""
+        return Cover.of(self.basis * np.sqrt(self.sizes) * weights[:, np.newaxis])
+
     def with_elsewhere(self, columns: Array) -> "Cover":
         """Return the cover with columns of signals that may act instead, each of one standard deviation."""
         white = self.white(columns.T).T
@@ -64,18 +75,41 @@ class Cover:
 
 
 @dataclass(frozen=True, eq=False)
+class Answer:
+    """Hold what noise of the inputs does to the signals of a piece; at: their samples among all, (n,)."""
+
+    at: NDArray[np.int64]
+    cover: Cover
+
+
+@dataclass(frozen=True, eq=False)
 class WhitenedData:
     """Hold records with their noise. Lists and arrays have an entry for each signal, record by record.
 
     levels: noise of each. sound: 0 where a sample is invalid, else 1, (n_samples,). estimates: where those of
-    fits are kept, None: nowhere. cover: of a signal without a form; None for none.
+    fits are kept, None: nowhere. answers: to noise of the inputs, where it counts. cover: of a signal without a form;
+    None for none.
     """
 
     records: tuple[Record, ...]
     levels: tuple[NoiseModel, ...]
     sound: Array
     estimates: Estimates | None = None
+    answers: tuple[Answer, ...] = ()
     cover: Cover | None = None
+
+    @cached_property
+    def log_noise(self) -> float:
+        """Half of the log determinant of the covariance of the noise."""
+        scale = sum(float(sound.sum()) * np.log(level.innovation)
+                    for level, sound in zip(self.levels, self.by_record(self.sound), strict=True))  # fmt: skip
+        return float(scale + 0.5 * sum(np.sum(np.log1p(a.cover.sizes)) for a in self.sound_answers))
+
+    @cached_property
+    def sound_answers(self) -> tuple[Answer, ...]:
+        """The answers in the samples that count."""
+        return tuple(a if self.sound[a.at].all() else replace(a, cover=a.cover.of_rows(self.sound[a.at]))
+                     for a in self.answers)  # fmt: skip
 
     @property
     def log_cover(self) -> float:
@@ -113,7 +147,7 @@ class WhitenedData:
     @property
     def holds_inputs(self) -> bool:
         """Whether noise of the inputs counts."""
-        return any(level.holds_inputs for level in self.levels)
+        return bool(self.answers)
 
     def n_noise(self, otherwise: float) -> float:
         """Return from how many independent samples the noise of slow signals is known; `otherwise` where from none."""
@@ -128,6 +162,8 @@ class WhitenedData:
         white = np.concatenate([level.white(s, lengths) for level, s, lengths in triples], axis=-1)
         # Invalid samples have weight 0.
         white = white if self.sound.all() else white * self.sound
+        for answer in self.sound_answers:
+            white[..., answer.at] = answer.cover.white(white[..., answer.at])
         return white if self.cover is None else self.cover.white(white)
 
     def independent(self, residual: Array) -> float:
@@ -156,6 +192,28 @@ class WhitenedData:
                 weight = new_share(part) / max(square, 1.0)
             weights.append(np.full(len(part), weight))
         return np.concatenate(weights)
+
+
+def with_answers(
+    data: WhitenedData, replays: Sequence[Replay], candidate: Array, noise: Mapping[str, InputNoise]
+) -> WhitenedData:  # fmt: skip
+    """Return data whose noise holds what noise of the inputs does at a candidate, to first order.
+
+    replays: of these records. candidate: whole, SI, (n_parameters,).
+    """
+    levels, places = dict(zip(replays, data.levels, strict=True)), dict(zip(replays, data.edges, strict=False))
+    found = []
+    for ready, signals in by_record(replays).items():
+        pieces = answers(ready, signals, candidate, noise, [levels[r].rms for r in signals])
+        starts = {r: places[r] + np.cumsum([0, *r.record.lengths]) for r in signals}
+        for i, piece in enumerate(pieces):
+            at = np.concatenate([np.arange(starts[r][i], starts[r][i + 1]) for r in signals])
+            white = [levels[r].white(columns.T, [len(columns)]).T for r, columns in zip(signals, piece, strict=True)]
+            found.append(Answer(at, Cover.of(np.vstack(white)).seen))
+        for j, r in enumerate(signals):
+            squares = np.concatenate([np.sum(piece[j] ** 2, axis=1) for piece in pieces])
+            levels[r] = replace(levels[r], moved=float(np.sqrt(np.mean(squares))))
+    return replace(data, levels=tuple(levels[r] for r in replays), answers=tuple(found))
 
 
 def whitened(records: Sequence[Record], plant: Plant, trained: WhitenedData | None = None) -> WhitenedData:

@@ -193,11 +193,6 @@ class InputNoise:
     rms: float = 0.0
     step: float = 0.0
 
-    def rounding(self, values: Array, rng: np.random.Generator) -> Array:
-        """Return drawn errors by rounding of an input, (n_samples,): each stays while the rounded value stays."""
-        runs = np.cumsum(np.diff(np.rint(values / self.step), prepend=np.nan) != 0.0) - 1
-        return np.asarray((self.step * (rng.random(int(runs[-1]) + 1) - 0.5))[runs])
-
 
 def noise_of_input(values: Array, outputs: Sequence[tuple[Array, bool]]) -> InputNoise:
     """Return the noise of an input, 0 for a command, which is known exactly.
