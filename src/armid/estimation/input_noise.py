@@ -24,8 +24,8 @@ DRAWS, SEED = 16, 1
 NEIGHBOURS, ROUNDS = 9, 40
 # Least variance of a second difference, in that of the noise.
 LEAST = 1e-12
-# Cosines that are tried at once; sum of squares of an answer, in units of the noise, that a sensor does not see.
-BLOCK, UNSEEN = 16, 0.1
+# Cosines that are tried at once. Sum of squares, in units of the noise, from which on samples see a signal.
+AT_ONCE, SMALLEST = 16, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +138,7 @@ def answers(
         known = [piece.smoothed[name] for piece in record.pieces]
         most, n, columns = min(one.values.size for one in known), 0, [list[Array]() for _ in signals]
         while n < most:
-            waves = [cosines(one.values.size, np.arange(n, min(n + BLOCK, most))) for one in known]
+            waves = [cosines(one.values.size, np.arange(n, min(n + AT_ONCE, most))) for one in known]
             deviations = [np.sqrt(np.diag(one.covariance(w, of.step))) for one, w in zip(known, waves, strict=True)]
             seen = 0.0
             for k in range(waves[0].shape[1]):
@@ -148,7 +148,7 @@ def answers(
                     column.append(r.seen(run)[0] - at_rest)
                     seen = max(seen, float(np.sum(column[-1] ** 2)) / size**2)
             n += waves[0].shape[1]
-            if seen < UNSEEN:
+            if seen < SMALLEST:
                 break
         for i, one in enumerate(known):
             covariance = one.covariance(cosines(one.values.size, np.arange(n)), of.step)

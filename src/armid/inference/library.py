@@ -39,7 +39,7 @@ from armid.problem.starts import fits_starts
 from armid.record import Override, Record
 
 # How many standard deviations a constant may be off; its sign stays.
-DEVIATIONS, LEAST_ERROR = 3.0, -0.95
+FARTHEST, LEAST_ERROR = 3.0, -0.95
 S = TypeVar("S")
 T = TypeVar("T")
 
@@ -207,7 +207,7 @@ class Library:
         """Return how far a strength may be searched whose declared range is a size to expect."""
         if powers_of(parameter.unit):
             return self.reach * parameter.low, self.reach * parameter.high
-        return max(DEVIATIONS * parameter.low, LEAST_ERROR), DEVIATIONS * parameter.high
+        return max(FARTHEST * parameter.low, LEAST_ERROR), FARTHEST * parameter.high
 
     @cached_property
     def scaled_strengths(self) -> frozenset[str]:

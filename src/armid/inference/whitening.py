@@ -12,16 +12,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.estimation.input_noise import answers
+from armid.estimation.input_noise import SMALLEST, answers
 from armid.estimation.least_squares import Estimates, LeastSquaresProblem
 from armid.estimation.noise_model import MISFIT, NoiseModel, noise_levels, sensor_of
 from armid.model import Array, Plant
 from armid.problem.problem import Replay, by_record, signals_of
 from armid.record import Record
 from armid.record.sensor import InputNoise, correlation_sum, new_share
-
-# Sum of squares, in units of the noise, from which on a signal is kept: the samples do not see smaller ones.
-SMALLEST = 0.1
 
 
 @dataclass(frozen=True, eq=False)
