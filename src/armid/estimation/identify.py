@@ -175,6 +175,12 @@ class Identification(Result):
         )  # fmt: skip
 
     @cached_property
+    def outputs(self) -> dict[str, dict[str, Any]]:
+        """Output -> its unit, the noise of its records, and how far noise of their inputs moves the model."""
+        replays = (*self.train_replays, *self.holdout_replays)
+        return entries_of_noise(replays, [r.record.noise.rms for r in replays], self.candidate)
+
+    @cached_property
     def interval_doubts(self) -> dict[str, str]:
         """Free parameter -> why its interval does not hold, "" where it does."""
         information, held = self.information, [self.space.names[i] for i in np.flatnonzero(self.at_bound)]
@@ -184,8 +190,9 @@ class Identification(Result):
             return dict.fromkeys(information.names, "the search has not come to the minimum")
         if any(level.from_residual for level in information.levels):
             return dict.fromkeys(information.names, "what the model leaves is more than the noise")
-        outputs, left = outputs_entry(self.train_replays, self.candidate), self.train.outputs
-        if any(inputs_act(o["noise_rms"], o["moved_by_inputs"], left[name].rmse) for name, o in outputs.items()):
+        left = self.train.outputs
+        if any(inputs_act(o["noise_rms"], o["moved_by_inputs"], left[name].rmse)
+               for name, o in self.outputs.items() if name in left):  # fmt: skip
             return dict.fromkeys(information.names, "noise of the inputs moves the model by more than that of a sensor")
         doubts = dict.fromkeys(information.names, "")
         if self.scatter is not None:
@@ -427,13 +434,11 @@ def output_errors(replays: Sequence[Replay], candidate: Array) -> Errors:
     )
 
 
-def outputs_entry(replays: Sequence[Replay], candidate: Array) -> dict[str, dict[str, Any]]:
-    """Return output -> its unit, its noise (the mean over records) and how far that of inputs moves it, for JSON."""
-    return entries_of_noise(replays, [r.record.noise.rms for r in replays], candidate)
-
-
 def entries_of_noise(replays: Sequence[Replay], noise: Sequence[float], candidate: Array) -> dict[str, dict[str, Any]]:
-    """Return what `outputs_entry` does, with a noise for each replay, its unit."""
+    """Return output -> its unit, its noise (the mean over records) and how far that of inputs moves it, for JSON.
+
+    noise: of each replay, its unit.
+    """
     levels = [(o, [rms for r, rms in zip(replays, noise, strict=True) if r.place == i])
               for i, o in enumerate(replays[0].model.plant.outputs)]  # fmt: skip
     moved = moved_by_inputs(replays, candidate)

@@ -8,7 +8,7 @@ import numpy as np
 
 from armid.engine.calibrate import NOISE_HIDES
 from armid.estimation.figures import PAIRS, curves_of, figures_of, record_figure
-from armid.estimation.identify import Identification, errors_by_file, outputs_entry, versions_of
+from armid.estimation.identify import Identification, errors_by_file, versions_of
 from armid.estimation.information import collinear
 from armid.problem.problem import Replay, judged_by
 from armid.report.document import (
@@ -202,7 +202,7 @@ def result_of(identification: Identification) -> dict[str, Any]:
         "stopped": identification.stopped,
         "seed": identification.seed,
         "noise": noises,
-        "outputs": outputs_entry(replays, identification.candidate),
+        "outputs": identification.outputs,
         "engine_error": max(r.engine_error_at(identification.candidate) for r in identification.train_replays),
         "model": str(identification.model),
         "versions": versions_of(PACKAGES),

@@ -21,11 +21,12 @@ from armid.record.sensor import InputNoise
 # Drawn errors, and their seed.
 DRAWS, SEED = 16, 1
 # Second differences that share a size, and steps towards these sizes.
-NEIGHBOURS, ROUNDS = 9, 40
+SHARING, ROUNDS = 9, 40
 # Least variance of a second difference, in that of the noise.
-LEAST = 1e-12
-# Cosines that are tried at once. Sum of squares, in units of the noise, from which on samples see a signal.
-AT_ONCE, SMALLEST = 16, 0.1
+STRAIGHTEST = 1e-12
+# Cosines that are tried at once, and at most: fast errors move a machine least. Sum of squares, in units of the noise,
+# from which on samples see a signal.
+AT_ONCE, MOST_COSINES, SMALLEST = 16, 256, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +88,7 @@ def smoothed(values: Array, noise: InputNoise) -> Smoothed:
     for _ in range(ROUNDS):
         now = Smoothed.of(values, variance, bends)
         squares = np.diff(now.values, 2) ** 2 + np.mean(np.diff(now.errors(DRAWS, rng), 2, axis=0) ** 2, axis=1)
-        bends = 1.0 / np.maximum(uniform_filter1d(squares, NEIGHBOURS, mode="nearest"), LEAST * variance)
+        bends = 1.0 / np.maximum(uniform_filter1d(squares, SHARING, mode="nearest"), STRAIGHTEST * variance)
     return Smoothed.of(values, variance, bends)
 
 
@@ -136,7 +137,8 @@ def answers(
     found: list[list[list[Array]]] = [[[] for _ in signals] for _ in record.pieces]
     for name, of in noise.items():
         known = [piece.smoothed[name] for piece in record.pieces]
-        most, n, columns = min(one.values.size for one in known), 0, [list[Array]() for _ in signals]
+        most, n = min(MOST_COSINES, *(one.values.size for one in known)), 0
+        columns = [list[Array]() for _ in signals]
         while n < most:
             waves = [cosines(one.values.size, np.arange(n, min(n + AT_ONCE, most))) for one in known]
             deviations = [np.sqrt(np.diag(one.covariance(w, of.step))) for one, w in zip(known, waves, strict=True)]
@@ -145,14 +147,17 @@ def answers(
                 changes = [w[:, k] * d[k] for w, d in zip(waves, deviations, strict=True)]
                 run = replace(ready, record=with_changes(record, name, changes)).runs(whole)
                 for column, r, at_rest, size in zip(columns, signals, exact, sizes, strict=True):
-                    column.append(r.seen(run)[0] - at_rest)
+                    # what diverges is not held to any noise
+                    column.append(np.nan_to_num(r.seen(run)[0] - at_rest, posinf=0.0, neginf=0.0))
                     seen = max(seen, float(np.sum(column[-1] ** 2)) / size**2)
             n += waves[0].shape[1]
             if seen < SMALLEST:
                 break
         for i, one in enumerate(known):
             covariance = one.covariance(cosines(one.values.size, np.arange(n)), of.step)
-            root = np.linalg.cholesky(covariance / np.sqrt(np.outer(np.diag(covariance), np.diag(covariance))))
+            # along straight lines alone, some of the cosines tell the same
+            squares, along = np.linalg.eigh(covariance)
+            root = along * np.sqrt(np.maximum(squares, 0.0)) / np.sqrt(np.diag(covariance))[:, np.newaxis]
             for j, r in enumerate(signals):
                 edges = np.cumsum([0, *r.record.lengths])
                 found[i][j].append(np.array(columns[j])[:, edges[i] : edges[i + 1]].T @ root)
