@@ -167,7 +167,7 @@ def test_what_a_right_model_leaves_is_turned_white(tmp_path):
         records = campaign(tmp_path / f"axis_{seed}", lambda drive, _, s=seed: noisy(drive, np.random.default_rng(s)))
         library, declared = prepared(Model(records.plant), records, candidates={})
         data, z = library.data, declared.records.shares(np.array([INERTIA, DAMPING]))
-        assert data.holds_inputs
+        assert data.inputs_count
         left = declared.records.plain.residuals(z)[0]
         chi2.append(float(np.mean(left**2)))
         lags += [np.mean(x[lag:] * x[:-lag]) for x in data.by_record(left) for lag in (1, 5, 25)]

@@ -26,7 +26,9 @@ SHARING, ROUNDS = 9, 40
 STRAIGHTEST = 1e-12
 # Cosines that are tried at once, and at most: fast errors move a machine least. Sum of squares, in units of the noise,
 # from which on samples see a signal.
-AT_ONCE, MOST_COSINES, SMALLEST = 16, 256, 0.1
+AT_ONCE, MOST_COSINES, SMALLEST = 16, 1024, 0.1
+# What rounding may add to a correlation.
+ROUNDING = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,9 +157,10 @@ def answers(
                 break
         for i, one in enumerate(known):
             covariance = one.covariance(cosines(one.values.size, np.arange(n)), of.step)
-            # along straight lines alone, some of the cosines tell the same
-            squares, along = np.linalg.eigh(covariance)
-            root = along * np.sqrt(np.maximum(squares, 0.0)) / np.sqrt(np.diag(covariance))[:, np.newaxis]
+            deviations_of = np.sqrt(np.diag(covariance))
+            # of an input that runs straight, some of the cosines tell the same
+            alike = covariance / np.outer(deviations_of, deviations_of) + ROUNDING * np.eye(n)
+            root = np.linalg.cholesky(alike)
             for j, r in enumerate(signals):
                 edges = np.cumsum([0, *r.record.lengths])
                 found[i][j].append(np.array(columns[j])[:, edges[i] : edges[i + 1]].T @ root)
@@ -165,7 +168,7 @@ def answers(
 
 
 def cosines(n_samples: int, numbers: NDArray[np.int64]) -> Array:
-    """Return orthonormal cosines over some samples, (n_samples, n), the first of which is a constant."""
+    """Return orthonormal cosines over some samples, (n_samples, n): number 0 is a constant."""
     waves = np.cos(np.pi * np.outer(np.arange(n_samples) + 0.5, numbers) / n_samples)
     return np.asarray(waves * np.where(numbers == 0, 1.0, np.sqrt(2.0)) / np.sqrt(n_samples))
 

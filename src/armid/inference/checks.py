@@ -295,7 +295,7 @@ def size_tests(seen: Residuals) -> Iterator[Finding]:
     """Compare mean squares with the noise: of all samples, of each record, before and after each switch.
 
     Of the residual as it is, not whitened: a filter that is known from a short rest is not trusted with its size. Where
-    noise of the inputs moves the machine, nothing but the whitened one has a size.
+    noise is correlated in blocks, nothing but the whitened one has a size.
     Either mean square counts as many samples as are independent for it.
     """
     if not seen.data.known:
@@ -304,7 +304,7 @@ def size_tests(seen: Residuals) -> Iterator[Finding]:
     rows, lengths = np.arange(n), np.diff(edges)
     records = {r.name: (rows >= a) & (rows < b) for r, (a, b) in zip(seen.replays, pairwise(edges), strict=True)}
     square = np.repeat([level.rms**-2.0 for level in levels], lengths) * np.concatenate(seen.raw) ** 2
-    square = seen.residual**2 if seen.doubted or seen.data.holds_inputs else square
+    square = seen.residual**2 if seen.doubted or seen.data.blocks else square
     counted = np.repeat([level.n_power / level.n_samples for level in levels], lengths)
     known, share = min(level.n_power for level in levels), 1.0 - seen.basis.shape[1] / n
     whole = {"all records": np.ones(n, dtype=np.bool_)}
@@ -336,10 +336,10 @@ def repeat_tests(seen: Residuals) -> Iterator[Finding]:
 def time_tests(seen: Residuals) -> Iterator[Finding]:
     """Test the autocorrelation of the residual, all records together (Ljung, Box 1978, doi:10.1093/biomet/65.2.297).
 
-    Only where the noise is white: what an imperfect filter leaves of coloured noise would be taken for a discrepancy;
-    there the spectra of residual and rest are compared (`band_tests`). Hum that the rests show is taken out before.
+    Only where the noise is white: what an imperfect filter leaves of coloured noise, or of that of the inputs, would be
+    taken for a discrepancy; there spectra are compared (`band_tests`). Hum that the rests show is taken out before.
     """
-    if seen.data.rests_have_colour:
+    if seen.data.rests_have_colour or seen.data.inputs_count:
         return
     parts, hum = seen.renewed, [sum(ends) / 2.0 for ends in mains_hum(seen)]
     if hum:
@@ -384,8 +384,8 @@ def structure(seen: Residuals, where: str, place: NDArray[np.int64], samples: ND
     indicators *= samples[:, np.newaxis]
     white = seen.data.white(seen.data.by_record(indicators.T)).T
     along, rank = square_along(beyond(seen.basis, white), seen.residual)
-    square = along / (1.0 if seen.data.known else float(np.mean(seen.residual**2)))
-    if not seen.data.known:
+    square = along / (1.0 if seen.data.sized else float(np.mean(seen.residual**2)))
+    if not seen.data.sized:
         # Neighbours tell the same: of the residual's own scatter only the independent samples count.
         square *= seen.data.independent(seen.residual) / len(seen.residual)
     known = seen.data.n_noise(otherwise=np.inf)
@@ -411,13 +411,13 @@ def band_tests(seen: Residuals) -> Iterator[Finding]:
     rest itself shows the spectrum.
     Where the rest hums, frequencies near by are left out: a line does not scatter as noise does.
     """
-    coloured = not (seen.doubted or seen.data.holds_inputs) and seen.data.rests_have_colour
+    coloured = not (seen.doubted or seen.data.blocks) and seen.data.rests_have_colour
     hum = mains_hum(seen)
     white = [level.rms * r for level, r in zip(seen.data.levels, seen.renewed, strict=True)]
     raw = [bridged(x, r) for x, r in zip(seen.raw, seen.replays, strict=True)] if coloured else white
     left = spectra(raw, seen, hum)
     rests = spectra([r.rest - np.mean(r.rest) for r in seen.data.each], seen, hum) if coloured else {}
-    flat = 1.0 if seen.data.known else float(np.mean(np.concatenate(seen.renewed) ** 2))
+    flat = 1.0 if seen.data.sized else float(np.mean(np.concatenate(seen.renewed) ** 2))
     for band, values in sorted(left.items()):
         other = rests.get(band, [])
         if coloured and len(other) < FEWEST_ORDINATES:

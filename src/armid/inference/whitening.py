@@ -11,6 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag, eigh
 
 from armid.estimation.input_noise import SMALLEST, answers
 from armid.estimation.least_squares import Estimates, LeastSquaresProblem
@@ -18,7 +19,7 @@ from armid.estimation.noise_model import MISFIT, NoiseModel, noise_levels, senso
 from armid.model import Array, Plant
 from armid.problem.problem import Replay, by_record, signals_of
 from armid.record import Record
-from armid.record.sensor import InputNoise, correlation_sum, new_share
+from armid.record.sensor import FEWEST_REST_SAMPLES, InputNoise, correlation_sum, new_share
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,15 +45,20 @@ class Cover:
         shares = 1.0 - 1.0 / np.sqrt(1.0 + self.sizes)
         return np.asarray(signals - ((signals @ self.basis) * shares) @ self.basis.T)
 
-    @property
-    def seen(self) -> "Cover":
-        """The cover without what the samples do not see."""
-        seen = self.sizes >= SMALLEST
-        return Cover(self.basis[:, seen], self.sizes[seen])
+    @classmethod
+    def seen(cls, columns: Array) -> "Cover":
+        """Return the cover of many columns without what the samples do not see."""
+        sizes, vectors = eigh(columns.T @ columns, subset_by_value=[SMALLEST, np.inf])
+        return cls(columns @ vectors / np.sqrt(sizes), sizes)
 
     def of_rows(self, weights: Array) -> "Cover":
         """Return the cover where samples have weights, (n_samples,)."""
-        return Cover.of(self.basis * np.sqrt(self.sizes) * weights[:, np.newaxis])
+        return Cover.of(self.columns * weights[:, np.newaxis])
+
+    @property
+    def columns(self) -> Array:
+        """Orthogonal columns B, (n_samples, rank)."""
+        return self.basis * np.sqrt(self.sizes)
 
     def with_elsewhere(self, columns: Array) -> "Cover":
         """Return the cover with columns of signals that may act instead, each of one standard deviation."""
@@ -72,8 +78,8 @@ class Cover:
 
 
 @dataclass(frozen=True, eq=False)
-class Answer:
-    """Hold what noise of the inputs does to the signals of a piece; at: their samples among all, (n,)."""
+class Block:
+    """Hold how noise is correlated in the samples of a piece, all its signals together; at: theirs among all, (n,)."""
 
     at: NDArray[np.int64]
     cover: Cover
@@ -84,7 +90,8 @@ class WhitenedData:
     """Hold records with their noise. Lists and arrays have an entry for each signal, record by record.
 
     levels: noise of each. sound: 0 where a sample is invalid, else 1, (n_samples,). estimates: where those of
-    fits are kept, None: nowhere. answers: to noise of the inputs, where it counts. cover: of a signal without a form;
+    fits are kept, None: nowhere. blocks: correlated noise, of pieces that
+    have some. inputs_count: whether noise of the inputs is part of it. cover: of a signal without a form;
     None for none.
     """
 
@@ -92,7 +99,8 @@ class WhitenedData:
     levels: tuple[NoiseModel, ...]
     sound: Array
     estimates: Estimates | None = None
-    answers: tuple[Answer, ...] = ()
+    blocks: tuple[Block, ...] = ()
+    inputs_count: bool = False
     cover: Cover | None = None
 
     @cached_property
@@ -100,13 +108,13 @@ class WhitenedData:
         """Half of the log determinant of the covariance of the noise."""
         scale = sum(float(sound.sum()) * np.log(level.innovation)
                     for level, sound in zip(self.levels, self.by_record(self.sound), strict=True))  # fmt: skip
-        return float(scale + 0.5 * sum(np.sum(np.log1p(a.cover.sizes)) for a in self.sound_answers))
+        return float(scale + 0.5 * sum(np.sum(np.log1p(b.cover.sizes)) for b in self.sound_blocks))
 
     @cached_property
-    def sound_answers(self) -> tuple[Answer, ...]:
-        """The answers in the samples that count."""
-        return tuple(a if self.sound[a.at].all() else replace(a, cover=a.cover.of_rows(self.sound[a.at]))
-                     for a in self.answers)  # fmt: skip
+    def sound_blocks(self) -> tuple[Block, ...]:
+        """The blocks in the samples that count."""
+        return tuple(b if self.sound[b.at].all() else replace(b, cover=b.cover.of_rows(self.sound[b.at]))
+                     for b in self.blocks)  # fmt: skip
 
     @property
     def log_cover(self) -> float:
@@ -130,21 +138,21 @@ class WhitenedData:
 
     def with_levels(self, levels: tuple[NoiseModel, ...]) -> "WhitenedData":
         """Return the records with another noise."""
-        return replace(self, levels=levels, sound=soundness_of(self.each, levels))
+        return with_standstills(replace(self, levels=levels, sound=soundness_of(self.each, levels)))
 
     @property
     def known(self) -> bool:
         return all(level.known for level in self.levels)
 
     @property
+    def sized(self) -> bool:
+        """Whether the size of the noise is known: by rests, or as noise of the inputs outweighs that of the sensors."""
+        return self.known or self.inputs_count
+
+    @property
     def rests_have_colour(self) -> bool:
         """Whether a rest tells a colour of the noise, hence its spectrum too."""
         return any(level.known and not level.is_white for level in self.levels)
-
-    @property
-    def holds_inputs(self) -> bool:
-        """Whether noise of the inputs counts."""
-        return bool(self.answers)
 
     def n_noise(self, otherwise: float) -> float:
         """Return from how many independent samples the noise of slow signals is known; `otherwise` where from none."""
@@ -159,8 +167,8 @@ class WhitenedData:
         white = np.concatenate([level.white(s, lengths) for level, s, lengths in triples], axis=-1)
         # Invalid samples have weight 0.
         white = white if self.sound.all() else white * self.sound
-        for answer in self.sound_answers:
-            white[..., answer.at] = answer.cover.white(white[..., answer.at])
+        for block in self.sound_blocks:
+            white[..., block.at] = block.cover.white(white[..., block.at])
         return white if self.cover is None else self.cover.white(white)
 
     def independent(self, residual: Array) -> float:
@@ -199,18 +207,53 @@ def with_answers(
     replays: of these records. candidate: whole, SI, (n_parameters,).
     """
     levels, places = dict(zip(replays, data.levels, strict=True)), dict(zip(replays, data.edges, strict=False))
-    found = []
+    blocks = {int(block.at[0]): block for block in data.blocks}
     for ready, signals in by_record(replays).items():
         pieces = answers(ready, signals, candidate, noise, [levels[r].rms for r in signals])
-        starts = {r: places[r] + np.cumsum([0, *r.record.lengths]) for r in signals}
         for i, piece in enumerate(pieces):
-            at = np.concatenate([np.arange(starts[r][i], starts[r][i + 1]) for r in signals])
+            at = samples_of([places[r] for r in signals], [r.record.lengths for r in signals], i)
             white = [levels[r].white(columns.T, [len(columns)]).T for r, columns in zip(signals, piece, strict=True)]
-            found.append(Answer(at, Cover.of(np.vstack(white)).seen))
+            own = [blocks[int(at[0])].cover.columns] if int(at[0]) in blocks else []
+            blocks[int(at[0])] = Block(at, Cover.seen(np.hstack([*own, np.vstack(white)])))
         for j, r in enumerate(signals):
             squares = np.concatenate([np.sum(piece[j] ** 2, axis=1) for piece in pieces])
             levels[r] = replace(levels[r], moved=float(np.sqrt(np.mean(squares))))
-    return replace(data, levels=tuple(levels[r] for r in replays), answers=tuple(found))
+    return replace(data, levels=tuple(levels[r] for r in replays), blocks=tuple(blocks.values()), inputs_count=True)
+
+
+def samples_of(starts: Sequence[int], lengths: Sequence[Sequence[int]], piece: int) -> NDArray[np.int64]:
+    """Return the samples of a piece among all, signal by signal; starts: of the signals. lengths: of their pieces."""
+    begins = [start + sum(n[:piece]) for start, n in zip(starts, lengths, strict=True)]
+    return np.concatenate([np.arange(a, a + n[piece]) for a, n in zip(begins, lengths, strict=True)])
+
+
+def with_standstills(data: WhitenedData) -> WhitenedData:
+    """Return data whose noise knows that what a sensor rounds away at a standstill is the same in all its samples."""
+    blocks, first = [], 0
+    for record in data.records:
+        own = range(first, first + len(record.each))
+        lengths = [data.lengths[i] for i in own]
+        for piece in range(len(lengths[0])):
+            columns = [standstill_columns(data.each[i], data.levels[i], piece) for i in own]
+            joint = block_diag(*columns)
+            if joint.shape[1]:
+                at = samples_of([int(data.edges[i]) for i in own], lengths, piece)
+                blocks.append(Block(at, Cover.of(joint)))
+        first += len(own)
+    return replace(data, blocks=tuple(blocks))
+
+
+def standstill_columns(record: Record, level: NoiseModel, piece: int) -> Array:
+    """Return the rounding error of each long run of equal values of a piece, whitened, (n_samples, n_runs)."""
+    n, step = record.lengths[piece], record.signals[0].sensor.step
+    first = sum(record.lengths[:piece])
+    values = record.seen[first : first + n]
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0.0) + 1, [n]])
+    runs = [(a, b) for a, b in pairwise(edges) if step and b - a >= FEWEST_REST_SAMPLES]
+    columns = np.zeros((len(runs), n))
+    for column, (a, b) in zip(columns, runs, strict=True):
+        column[a:b] = step / np.sqrt(12.0)
+    return level.white(columns, [n]).T
 
 
 def whitened(records: Sequence[Record], plant: Plant, trained: WhitenedData | None = None) -> WhitenedData:
@@ -221,7 +264,7 @@ def whitened(records: Sequence[Record], plant: Plant, trained: WhitenedData | No
         theirs = dict(zip(map(sensor_of, more), trained.levels, strict=True))
         levels = tuple(level if level.known else theirs.get(sensor_of(r), level)
                        for r, level in zip(each, levels, strict=True))  # fmt: skip
-    return WhitenedData(tuple(records), levels, soundness_of(each, levels))
+    return with_standstills(WhitenedData(tuple(records), levels, soundness_of(each, levels)))
 
 
 def soundness_of(each: Sequence[Record], levels: Sequence[NoiseModel]) -> Array:
