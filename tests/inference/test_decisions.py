@@ -14,7 +14,7 @@ FILES = sorted([*(SRC / "loop").glob("*.py"), *(SRC / "inference").rglob("*.py")
 MOST = 20
 # Constants that are compared with and decide nothing that a user is told, by what they are.
 NUMERICS = {
-    "rounding": ("DEPENDENT", "NEGLIGIBLE", "ROUNDING", "ROUGHLY", "LEAST", "SMALLEST", "SAME_RESPONSE"),
+    "rounding": ("DEPENDENT", "NEGLIGIBLE", "ROUNDING", "ROUGHLY", "LEAST", "SAME_RESPONSE"),
     "whether differences tell a slope": ("BELIEVED", "LEAST_RISE", "PARALLEL", "BENT", "FOLLOWED"),
     "convergence of fits and of the engine": (
         "SETTLED",

@@ -6,7 +6,7 @@ deviation of 1: every test then counts samples.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 
 import numpy as np
@@ -50,10 +50,6 @@ class Cover:
         """Return the cover of many columns without what the samples do not see."""
         sizes, vectors = eigh(columns.T @ columns, subset_by_value=[SMALLEST, np.inf])
         return cls(columns @ vectors / np.sqrt(sizes), sizes)
-
-    def of_rows(self, weights: Array) -> "Cover":
-        """Return the cover where samples have weights, (n_samples,)."""
-        return Cover.of(self.columns * weights[:, np.newaxis])
 
     @property
     def columns(self) -> Array:
@@ -113,8 +109,7 @@ class WhitenedData:
     @cached_property
     def sound_blocks(self) -> tuple[Block, ...]:
         """The blocks in the samples that count."""
-        return tuple(b if self.sound[b.at].all() else replace(b, cover=b.cover.of_rows(self.sound[b.at]))
-                     for b in self.blocks)  # fmt: skip
+        return self.blocks if self.sound.all() else blocks_of_rows(self.blocks, self.sound.tobytes())
 
     @property
     def log_cover(self) -> float:
@@ -197,6 +192,14 @@ class WhitenedData:
                 weight = new_share(part) / max(square, 1.0)
             weights.append(np.full(len(part), weight))
         return np.concatenate(weights)
+
+
+@lru_cache(maxsize=16)  # many models are asked for the same parts of the records
+def blocks_of_rows(blocks: tuple[Block, ...], weights: bytes) -> tuple[Block, ...]:
+    """Return blocks where samples have weights, (n_samples,)."""
+    rows = np.frombuffer(weights)
+    return tuple(b if rows[b.at].all() else replace(b, cover=Cover.seen(b.cover.columns * rows[b.at][:, np.newaxis]))
+                 for b in blocks)  # fmt: skip
 
 
 def with_answers(
