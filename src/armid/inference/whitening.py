@@ -85,10 +85,9 @@ class Block:
 class WhitenedData:
     """Hold records with their noise. Lists and arrays have an entry for each signal, record by record.
 
-    levels: noise of each. sound: 0 where a sample is invalid, else 1, (n_samples,). estimates: where those of
-    fits are kept, None: nowhere. blocks: correlated noise, of pieces that
-    have some. inputs_count: whether noise of the inputs is part of it. cover: of a signal without a form;
-    None for none.
+    levels: noise of each. sound: 0 where a sample is invalid, else 1, (n_samples,). estimates: where those of fits are
+    kept, None: nowhere. blocks: correlated noise, of pieces that have some. inputs_count: whether noise of the inputs
+    is part of it. cover: of a signal without a form; None for none.
     """
 
     records: tuple[Record, ...]
@@ -256,7 +255,8 @@ def standstill_columns(record: Record, level: NoiseModel, piece: int) -> Array:
     columns = np.zeros((len(runs), n))
     for column, (a, b) in zip(columns, runs, strict=True):
         column[a:b] = step / np.sqrt(12.0)
-    return level.white(columns, [n]).T
+    # a filter does not take nothing
+    return level.white(columns, [n]).T if runs else columns.T
 
 
 def whitened(records: Sequence[Record], plant: Plant, trained: WhitenedData | None = None) -> WhitenedData:
