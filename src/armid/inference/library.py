@@ -200,14 +200,14 @@ class Library:
             elif mine is not None and mine.free_shape and name in self.fixed_shapes(mine):
                 space = space.with_bounds(name, parameter.low, parameter.high)
             elif self.reach > 1.0 and mine is not None and name in space.free_names and name in self.scaled_strengths:
-                space = space.with_bounds(name, *self.box_of(parameter))
+                space = space.with_bounds(name, *self.box_of(name, parameter))
         return space
 
-    def box_of(self, parameter: Parameter) -> tuple[float, float]:
+    def box_of(self, name: str, parameter: Parameter) -> tuple[float, float]:
         """Return how far a strength may be searched whose declared range is a size to expect."""
-        if powers_of(parameter.unit):
-            return self.reach * parameter.low, self.reach * parameter.high
-        return max(FARTHEST * parameter.low, LEAST_ERROR), FARTHEST * parameter.high
+        if name.startswith(ERROR_OF):
+            return max(FARTHEST * parameter.low, LEAST_ERROR), FARTHEST * parameter.high
+        return self.reach * parameter.low, self.reach * parameter.high
 
     @cached_property
     def scaled_strengths(self) -> frozenset[str]:
