@@ -227,12 +227,13 @@ def test_all_constants_may_be_off_at_once(usual):
     assert max(off_by(found)) < 1.5
 
 
-def test_a_constant_that_is_known_roughly_is_looked_for_as_an_effect_is(stand):
-    """The resistance is declared 25 % too high, and known to a half."""
-    campaign, half = read_campaign(stand(*COMMON)), {"R": 0.5}
+@pytest.mark.parametrize("deviation", [0.5, 0.1])
+def test_a_constant_that_is_known_roughly_is_looked_for_as_an_effect_is(stand, deviation):
+    """The resistance is declared 25 % too high: less than one of its deviations, or two."""
+    campaign, known = read_campaign(stand(*COMMON)), {"R": deviation}
     records = tuple(moved_record(r, campaign.plant, {"R": 0.25}) for r in campaign.records)
     found = close_loop(
-        Model(campaign.plant), replace(campaign, records=records, tolerances=half, rough=half), CANDIDATES
+        Model(campaign.plant), replace(campaign, records=records, tolerances=known, rough=known), CANDIDATES
     )
     assert (found.verdict, found.effects) == ("explained", ("constant:R",))
     (step,) = report_of(found)["steps"]
