@@ -7,6 +7,7 @@ best estimate, and the error of that, as the machine answers to it, is part of t
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,8 +86,13 @@ def smoothed(values: Array, noise: InputNoise) -> Smoothed:
     Its second differences are normal, with a size that neighbours share: it is large at a jump and small at rest. The
     sizes are those under which the column is most probable (expectation and maximisation, by drawn errors).
     """
-    rng, variance = np.random.default_rng(SEED), noise.rms**2 + noise.step**2 / 12.0
-    bends = np.full(values.size - 2, 1.0 / variance)
+    return smoothed_bytes(values.tobytes(), noise)
+
+
+@lru_cache(maxsize=64)  # whole and cut pieces, and many models, ask for the same columns
+def smoothed_bytes(column: bytes, noise: InputNoise) -> Smoothed:
+    values, variance = np.frombuffer(column), noise.rms**2 + noise.step**2 / 12.0
+    rng, bends = np.random.default_rng(SEED), np.full(values.size - 2, 1.0 / variance)
     for _ in range(ROUNDS):
         now = Smoothed.of(values, variance, bends)
         squares = np.diff(now.values, 2) ** 2 + np.mean(np.diff(now.errors(DRAWS, rng), 2, axis=0) ** 2, axis=1)
@@ -130,41 +136,55 @@ def answers(
 ) -> list[list[Array]]:  # fmt: skip
     """Return how signals of a record answer to the errors of its inputs: of each piece an array for each signal.
 
-    Its columns, (n_samples, n), are the answers to independent errors of one standard deviation. The errors are sums of
-    cosines over the piece, from the slowest on until the sensors do not see the answers: each costs a simulation.
-    candidate: whole, SI. noise: of the inputs. sizes: noise of each signal's sensor, rms [its unit].
+    Its columns, (n_samples, n), are the answers to independent errors of one standard deviation. candidate: whole, SI.
+    noise: of the inputs. sizes: noise of each signal's sensor, rms [its unit].
     """
-    record, whole = estimated(ready.record, noise), candidate[np.newaxis]
-    exact = [r.seen(replace(ready, record=record).runs(whole))[0] for r in signals]
-    found: list[list[list[Array]]] = [[[] for _ in signals] for _ in record.pieces]
+    ready = replace(ready, record=estimated(ready.record, noise))
+    found: list[list[list[Array]]] = [[[] for _ in signals] for _ in ready.record.pieces]
     for name, of in noise.items():
-        known = [piece.smoothed[name] for piece in record.pieces]
-        most, n = min(MOST_COSINES, *(one.values.size for one in known)), 0
-        columns = [list[Array]() for _ in signals]
-        while n < most:
-            waves = [cosines(one.values.size, np.arange(n, min(n + AT_ONCE, most))) for one in known]
-            deviations = [np.sqrt(np.diag(one.covariance(w, of.step))) for one, w in zip(known, waves, strict=True)]
-            seen = 0.0
-            for k in range(waves[0].shape[1]):
-                changes = [w[:, k] * d[k] for w, d in zip(waves, deviations, strict=True)]
-                run = replace(ready, record=with_changes(record, name, changes)).runs(whole)
-                for column, r, at_rest, size in zip(columns, signals, exact, sizes, strict=True):
-                    # what diverges is not held to any noise
-                    column.append(np.nan_to_num(r.seen(run)[0] - at_rest, posinf=0.0, neginf=0.0))
-                    seen = max(seen, float(np.sum(column[-1] ** 2)) / size**2)
-            n += waves[0].shape[1]
-            if seen < SMALLEST:
-                break
-        for i, one in enumerate(known):
-            covariance = one.covariance(cosines(one.values.size, np.arange(n)), of.step)
-            deviations_of = np.sqrt(np.diag(covariance))
-            # of an input that runs straight, some of the cosines tell the same
-            alike = covariance / np.outer(deviations_of, deviations_of) + ROUNDING * np.eye(n)
-            root = np.linalg.cholesky(alike)
-            for j, r in enumerate(signals):
-                edges = np.cumsum([0, *r.record.lengths])
-                found[i][j].append(np.array(columns[j])[:, edges[i] : edges[i + 1]].T @ root)
+        by_signal = answers_to_cosines(ready, signals, candidate, name, of, sizes)
+        for i, piece in enumerate(ready.record.pieces):
+            root = root_of_correlation(piece.smoothed[name], len(by_signal[0]), of.step)
+            for j, (r, changes) in enumerate(zip(signals, by_signal, strict=True)):
+                first = sum(r.record.lengths[:i])
+                found[i][j].append(changes[:, first : first + r.record.lengths[i]].T @ root)
     return [[np.hstack(each) for each in piece] for piece in found]
+
+
+def answers_to_cosines(
+    ready: ReadyRecord, signals: Sequence[Replay], candidate: Array, name: str, noise: InputNoise,
+    sizes: Sequence[float],
+) -> list[Array]:  # fmt: skip
+    """Return how each signal answers to cosines of one input, (n, n_samples), each of one standard deviation.
+
+    From the slowest on until the sensors do not see the answers: each costs a simulation, of all pieces at once. Other
+    arguments as for `answers`.
+    """
+    whole, known = candidate[np.newaxis], [piece.smoothed[name] for piece in ready.record.pieces]
+    exact = [r.seen(ready.runs(whole))[0] for r in signals]
+    most, columns = min(MOST_COSINES, *(one.values.size for one in known)), [list[Array]() for _ in signals]
+    for first in range(0, most, AT_ONCE):
+        numbers = np.arange(first, min(first + AT_ONCE, most))
+        waves = [cosines(one.values.size, numbers) for one in known]
+        scaled = [w * np.sqrt(np.diag(one.covariance(w, noise.step))) for w, one in zip(waves, known, strict=True)]
+        seen = 0.0
+        for k in range(len(numbers)):
+            run = replace(ready, record=with_changes(ready.record, name, [w[:, k] for w in scaled])).runs(whole)
+            for column, r, at_rest, size in zip(columns, signals, exact, sizes, strict=True):
+                # a simulation that diverges adds no noise
+                column.append(np.nan_to_num(r.seen(run)[0] - at_rest, posinf=0.0, neginf=0.0))
+                seen = max(seen, float(np.sum(column[-1] ** 2)) / size**2)
+        if seen < SMALLEST:
+            break
+    return [np.array(column) for column in columns]
+
+
+def root_of_correlation(known: Smoothed, n: int, step: float) -> Array:
+    """Return the Cholesky factor of the correlation of the error's first n cosines, (n, n); step: of the sensor."""
+    covariance = known.covariance(cosines(known.values.size, np.arange(n)), step)
+    deviations = np.sqrt(np.diag(covariance))
+    # the cosines of a straight input are collinear
+    return np.linalg.cholesky(covariance / np.outer(deviations, deviations) + ROUNDING * np.eye(n))
 
 
 def cosines(n_samples: int, numbers: NDArray[np.int64]) -> Array:

@@ -86,12 +86,12 @@ class Residuals:
 
     def pooled(self, sizes: Sequence[float]) -> dict[str, float]:
         """Return the rms of each output that is recorded, all samples together; sizes: rms of each signal."""
-        squares: dict[str, list[Array]] = {}
-        for replay, size in zip(self.replays, sizes, strict=True):
-            squares.setdefault(self.model.plant.outputs[replay.place].name, []).append(
-                np.full(len(replay.measured), size**2))  # fmt: skip
-        in_order = [o.name for o in self.model.plant.outputs if o.name in squares]
-        return {name: float(np.sqrt(np.mean(np.concatenate(squares[name])))) for name in in_order}
+        pooled: dict[str, float] = {}
+        for place in sorted({r.place for r in self.replays}):
+            of = [(size, len(r.measured)) for size, r in zip(sizes, self.replays, strict=True) if r.place == place]
+            square = sum(size**2 * n for size, n in of) / sum(n for _, n in of)
+            pooled[self.model.plant.outputs[place].name] = float(np.sqrt(square))
+        return pooled
 
     @cached_property
     def memory(self) -> dict[int, float]:

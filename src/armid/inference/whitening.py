@@ -19,7 +19,7 @@ from armid.estimation.noise_model import MISFIT, NoiseModel, noise_levels, senso
 from armid.model import Array, Plant
 from armid.problem.problem import Replay, by_record, signals_of
 from armid.record import Record
-from armid.record.sensor import FEWEST_REST_SAMPLES, InputNoise, correlation_sum, new_share
+from armid.record.sensor import FEWEST_REST_SAMPLES, InputNoise, correlation_sum, new_share, runs
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,8 +86,8 @@ class WhitenedData:
     """Hold records with their noise. Lists and arrays have an entry for each signal, record by record.
 
     levels: noise of each. sound: 0 where a sample is invalid, else 1, (n_samples,). estimates: where those of fits are
-    kept, None: nowhere. blocks: correlated noise, of pieces that have some. inputs_count: whether noise of the inputs
-    is part of it. cover: of a signal without a form; None for none.
+    kept, None: nowhere. blocks: correlated noise, of pieces that have some. cover: of a signal without a form; None for
+    none.
     """
 
     records: tuple[Record, ...]
@@ -95,7 +95,6 @@ class WhitenedData:
     sound: Array
     estimates: Estimates | None = None
     blocks: tuple[Block, ...] = ()
-    inputs_count: bool = False
     cover: Cover | None = None
 
     @cached_property
@@ -137,6 +136,11 @@ class WhitenedData:
     @property
     def known(self) -> bool:
         return all(level.known for level in self.levels)
+
+    @property
+    def inputs_count(self) -> bool:
+        """Whether noise of the inputs is part of the noise."""
+        return any(level.moved for level in self.levels)
 
     @property
     def sized(self) -> bool:
@@ -220,7 +224,7 @@ def with_answers(
         for j, r in enumerate(signals):
             squares = np.concatenate([np.sum(piece[j] ** 2, axis=1) for piece in pieces])
             levels[r] = replace(levels[r], moved=float(np.sqrt(np.mean(squares))))
-    return replace(data, levels=tuple(levels[r] for r in replays), blocks=tuple(blocks.values()), inputs_count=True)
+    return replace(data, levels=tuple(levels[r] for r in replays), blocks=tuple(blocks.values()))
 
 
 def samples_of(starts: Sequence[int], lengths: Sequence[Sequence[int]], piece: int) -> NDArray[np.int64]:
@@ -249,14 +253,12 @@ def standstill_columns(record: Record, level: NoiseModel, piece: int) -> Array:
     """Return the rounding error of each long run of equal values of a piece, whitened, (n_samples, n_runs)."""
     n, step = record.lengths[piece], record.signals[0].sensor.step
     first = sum(record.lengths[:piece])
-    values = record.seen[first : first + n]
-    edges = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0.0) + 1, [n]])
-    runs = [(a, b) for a, b in pairwise(edges) if step and b - a >= FEWEST_REST_SAMPLES]
-    columns = np.zeros((len(runs), n))
-    for column, (a, b) in zip(columns, runs, strict=True):
+    standstills = runs(record.seen[first : first + n], FEWEST_REST_SAMPLES) if step else []
+    columns = np.zeros((len(standstills), n))
+    for column, (a, b) in zip(columns, standstills, strict=True):
         column[a:b] = step / np.sqrt(12.0)
-    # a filter does not take nothing
-    return level.white(columns, [n]).T if runs else columns.T
+    # scipy's filter refuses an empty array
+    return level.white(columns, [n]).T if standstills else columns.T
 
 
 def whitened(records: Sequence[Record], plant: Plant, trained: WhitenedData | None = None) -> WhitenedData:

@@ -5,7 +5,7 @@ two rows makes values that no sensor gave.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import ceil, comb, log1p
 
@@ -201,16 +201,15 @@ def noise_of_input(values: Array, outputs: Sequence[tuple[Array, bool]]) -> Inpu
     several lengths of this rest the quietest counts, as the drive may begin before the machine moves.
     values: (n_rows,). outputs: columns of the machine's motion, (n_rows,) each, and whether each is a speed.
     """
-    seen, n = list[float](), FEWEST_REST_SAMPLES
+    seen = list[float]()
     if np.unique(values).size < FEWEST_STEPS:
         return InputNoise()
     rests = [(values, 0.0, False), *((y, float(np.nanmax(np.abs(y))), is_speed) for y, is_speed in outputs)]
-    while n <= values.size and all(stands_still(x[:n], size, is_speed) for x, size, is_speed in rests):
+    for n in lengths_of_rest(rests):
         deviations = values[:n] - np.mean(values[:n])
         # of equal values the mean can miss the value by its last digit
         is_equal = np.ptp(values[:n]) == 0.0
         seen.append(0.0 if is_equal else float(np.std(deviations)) * np.sqrt(1.0 + 2.0 * correlation_sum(deviations)))
-        n = ceil(LONGER_REST * n)
     return InputNoise(float(min(seen, default=0.0)), rounding_of_input(values))
 
 
@@ -224,12 +223,15 @@ def rounding_of_input(values: Array) -> float:
     return step if np.mean((steps != 0.0) & np.append(True, np.diff(steps) != 0.0)) >= CHANGING else 0.0
 
 
-def quiet_rows(values: Array) -> int:
-    """Return for how many rows an input is noise about a mean from the first one on, 0 where for fewer than 50."""
-    n, longest = FEWEST_REST_SAMPLES, 0
-    while n <= values.size and stands_still(values[:n], 0.0, False):
-        n, longest = ceil(LONGER_REST * n), n
-    return longest
+def lengths_of_rest(columns: Sequence[tuple[Array, float, bool]]) -> Iterator[int]:
+    """Yield growing numbers of first rows in which all columns stand still.
+
+    columns: values, (n_rows,), with the other arguments of `stands_still`.
+    """
+    n = FEWEST_REST_SAMPLES
+    while n <= columns[0][0].size and all(stands_still(x[:n], size, is_speed) for x, size, is_speed in columns):
+        yield n
+        n = ceil(LONGER_REST * n)
 
 
 def rest_between(values: Array, still: Mask, is_speed: bool) -> Array:
@@ -474,10 +476,10 @@ def is_abrupt(values: Array, begin: int, end: int, least: float) -> bool:
     return bool(away) and min(away) >= least
 
 
-def runs(values: Array) -> list[tuple[int, int]]:
-    """Return first row and end of the runs of equal values that are too long for a chance."""
+def runs(values: Array, shortest: int = REPEATED) -> list[tuple[int, int]]:
+    """Return first row and end of the runs of equal values that are so long or longer."""
     edges = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0.0) + 1, [values.size]])
-    long = np.flatnonzero(np.diff(edges) >= REPEATED)
+    long = np.flatnonzero(np.diff(edges) >= shortest)
     return list(zip(edges[long].tolist(), edges[long + 1].tolist(), strict=True))
 
 

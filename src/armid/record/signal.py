@@ -17,8 +17,8 @@ from armid.record.sensor import (
     after_sudden,
     difference_rms,
     in_runs,
+    lengths_of_rest,
     noise_of,
-    quiet_rows,
     renewed,
     repeated_samples,
     rest_between,
@@ -114,7 +114,8 @@ def rest_and_noise(new: New, inputs: Sequence[Array], is_speed: bool) -> tuple[A
     if new.rest.size >= FEWEST_REST_SAMPLES or not inputs:
         return new.rest, noise
     changes = sum((np.append(0, np.cumsum(np.diff(x) != 0.0)) for x in inputs), np.zeros(inputs[0].size))
-    still = ~new.since(changes)[new.n_rest :] | (new.at[new.n_rest :] < min(map(quiet_rows, inputs)))
+    n_still = max(lengths_of_rest([(x, 0.0, False) for x in inputs]), default=0)
+    still = ~new.since(changes)[new.n_rest :] | (new.at[new.n_rest :] < n_still)
     rest = rest_between(new.motion, still, is_speed)
     # equal values tell the step of the sensor alone, which the motion tells as well
     if not rest.size or np.ptp(rest) == 0.0:

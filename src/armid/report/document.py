@@ -383,13 +383,13 @@ def noise_text(noise: float, output: Mapping[str, Any], error: Mapping[str, Any]
 
 def moved_text(outputs: Mapping[str, Mapping[str, Any]], error: Mapping[str, Any]) -> str:
     """Return how far noise of the inputs moves each output but the first, where this shows; error: of all outputs."""
-    said = ""
+    text = ""
     for name, output in list(outputs.items())[1:]:
         left = error["outputs"].get(name, {"rmse": None})["rmse"]
         if inputs_act(output["noise_rms"], moved_of(output), left):
             (moved, unit), (noise, _) = (shown(x, output["unit"]) for x in (moved_of(output), output["noise_rms"]))
-            said += f" Noise of the inputs moves {name} by {moved:.3g} {unit}; that of its sensor is {noise:.3g}."
-    return said
+            text += f" Noise of the inputs moves {name} by {moved:.3g} {unit}; that of its sensor is {noise:.3g}."
+    return text
 
 
 def moved_of(output: Mapping[str, Any]) -> float:
