@@ -57,7 +57,7 @@ class Mixture:
         sets = [frozenset((kind, name) for kind, name in m["names"]) for m in models]
         self.evidence = np.array([m["log_evidence"] for m in models])
         self.prior = np.array([m["log_prior"] for m in models])
-        # What is left beyond doubt has no prior of its own.
+        # What tests alone find keeps its prior.
         self.counts = np.array([[sum(k == kind and n != "output" for k, n in s) for kind in KINDS] for s in sets])
         unknown = np.array([any(k == "unknown" for k, _ in s) for s in sets])
         self.holds, self.true = [unknown], [float(one.is_unlisted and one.leaves_declared)]

@@ -7,7 +7,7 @@ import pytest
 
 from armid import close_loop, identify, read_campaign
 from armid.estimation.identify_document import answer, details_of, result_of
-from armid.estimation.input_noise import cosines, moved_by_inputs, pooled_noise, smoothed
+from armid.estimation.input_noise import at_rest, cosines, moved_by_inputs, pooled_noise, smoothed
 from armid.inference.infer import prepared
 from armid.loop import report_of
 from armid.loop.document import error_sentence
@@ -17,6 +17,7 @@ from armid.record.sensor import InputNoise, noise_of_input
 
 INERTIA, DAMPING, INTERVAL, SPEED_NOISE, TORQUE_NOISE = 0.05, 0.03, 0.01, 0.005, 0.02
 TIMES = INTERVAL * np.arange(1200)
+NOWHERE = np.zeros(len(TIMES), dtype=np.bool_)
 
 
 def torque(seed):
@@ -129,13 +130,28 @@ def test_the_estimate_is_closer_than_the_column_and_knows_its_error(name):
     for seed in range(6):
         rng = np.random.default_rng(seed)
         column = true + rng.normal(0.0, 0.03, len(true))
-        found = smoothed(column, InputNoise(rms=0.03))
+        found = smoothed(column, InputNoise(rms=0.03), NOWHERE)
         misses.append(np.mean((found.values - true) ** 2))
         claimed.append(np.mean(found.errors(16, rng) ** 2))
         assert np.sqrt(misses[-1]) < 0.7 * 0.03
         # what drives a machine far is the sum of the errors
         assert abs(np.sum(found.values - column)) < 1e-6 * len(true)
     assert np.sqrt(np.mean(misses) / np.mean(claimed)) == pytest.approx(1.0, abs=0.25)
+
+
+def test_where_machine_and_input_stand_still_the_input_is_constant(tmp_path):
+    """Else its estimate would turn a machine there that does not move, and friction that holds it were likely."""
+    pushed = 0.3 * ((TIMES > 1.0) & (TIMES < 9.0))
+    record, *_ = campaign(tmp_path / "axis", noisy, lambda _: pushed).train
+    piece = record.pieces[0]
+    column = piece.manoeuvre.inputs["u"]
+    still = at_rest(record, piece, column)
+    assert still[:70].all()
+    assert not still[100:1000].any()
+    known = smoothed(column, InputNoise(rms=TORQUE_NOISE), still)
+    assert np.ptp(known.values[:70]) < 1e-3 * TORQUE_NOISE
+    errors = known.errors(400, np.random.default_rng(1))[25]
+    assert np.std(errors) == pytest.approx(TORQUE_NOISE / np.sqrt(still[:100].sum()), rel=0.2)
 
 
 @pytest.mark.parametrize("step", [0.0, 0.05])
@@ -145,12 +161,12 @@ def test_the_covariance_of_its_error_is_that_of_drawn_columns(step):
     noise = InputNoise(rms=0.0 if step else 0.03, step=step)
     rng = np.random.default_rng(1)
     if step:
-        known = smoothed(step * np.rint(true / step), noise)
+        known = smoothed(step * np.rint(true / step), noise, NOWHERE)
         begins = np.flatnonzero(np.diff(np.rint(known.values / step), prepend=np.nan) != 0.0)
         runs = np.repeat(np.arange(len(begins)), np.diff(np.append(begins, len(TIMES))))
         columns = step * (rng.random((len(begins), 400))[runs] - 0.5)
     else:
-        known = smoothed(true + rng.normal(0.0, 0.03, len(TIMES)), noise)
+        known = smoothed(true + rng.normal(0.0, 0.03, len(TIMES)), noise, NOWHERE)
         columns = rng.normal(0.0, 0.03, (len(TIMES), 400))
     followed = waves.T @ known.solved(columns / known.variance)
     covariance = known.covariance(waves, step)
@@ -214,4 +230,3 @@ def test_inputs_count_as_exact_where_the_records_are_more_probable_so(tmp_path):
     assert "taking the measured inputs as measured with noise" in steps
     assert found.inference.exploration.library.as_read is None
     assert found.effects == ("viscous",)
-    assert found.steps[0].claimed

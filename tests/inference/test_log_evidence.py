@@ -10,7 +10,7 @@ from scipy.stats import multivariate_normal
 from armid.inference.decisions import Calibration, calibration
 from armid.inference.evidence import Expansion, Scale, forecast
 from armid.inference.hypothesis import Hypothesis, Proposal
-from armid.inference.posterior import Atom, Posterior, truncated
+from armid.inference.posterior import Atom, Posterior, most_odds, truncated
 from armid.inference.whitening import Cover
 
 N, RNG = 60, np.random.default_rng(11)
@@ -104,7 +104,13 @@ def test_prior_odds_are_shared_out():
     odds = (0.7 / 36) / (1 - 0.7 / 36)
     assert np.exp(beliefs.log_odds("effect", 36)) == pytest.approx(odds)
     assert np.exp(beliefs.log_odds("effect", 36, "coulomb")) == pytest.approx(4.0 * odds)
-    assert set(calibration().expected) == {"effect", "record", "drift", "unknown"}
+    assert set(calibration().expected) == {"effect", "record", "drift", "unknown", "unseen"}
+
+
+@pytest.mark.parametrize(("p", "odds"), [(1.0, 1.0), (0.5, 1.0), (0.05, 2.4560), (0.005, 13.887), (1e-7, 228241.0)])
+def test_a_p_value_allows_so_much_evidence_against_noise(p, odds):
+    """Values of the table of Sellke, Bayarri and Berger (2001)."""
+    assert most_odds(p) == pytest.approx(odds, rel=1e-4)
 
 
 def test_a_temperature_makes_evidence_weaker_and_leaves_the_prior():

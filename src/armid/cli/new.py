@@ -217,12 +217,13 @@ HEADERS = {
     ("position", False): ("angle", tuple(SUFFIXES["rad"]), "rad"),
     ("position", True): ("position", ("m",), "m"),
     ("drive", False): ("drive", ("V", "N_m"), "V"),
-    ("drive", True): ("drive", ("V", "N"), "V"),
+    ("drive", True): ("drive", ("V", "N", "N_m"), "V"),
 }
 # Units of a drive with a prefix -> end of the unit, and what turns a number into it.
 DRIVEN_IN = {"mV": ("V", 1e-3), "kV": ("V", 1e3), "mA": ("A", 1e-3), "kN": ("N", 1e3), "mN m": ("N_m", 1e-3),
              "mNm": ("N_m", 1e-3), "kNm": ("N_m", 1e3), "kN m": ("N_m", 1e3)}  # fmt: skip
 LINEAR, DRIVES = {"m", "mm", "m_s", "mm_s", "N"}, {"V", "A", "N", "N_m"}
+TURNING = {*SUFFIXES["rad/s"], *SUFFIXES["rad"]}
 # A machine is at rest as long as its signal is nearer to its first rows than so many times their range.
 BEYOND_REST = 2.5
 # Share of equal neighbours from which on an input keeps its value between samples.
@@ -281,6 +282,12 @@ def guessed_campaign(name: str, files: Sequence[Path]) -> tuple[str, dict[str, d
     if linear and "speed" not in roles:
         raise ArmidError(f"{tables[0].where}: a position of a linear axis is there and no speed, which armid has no "
                          "plant for: a speed, or a plant of your own by `armid new plant`, is expected")  # fmt: skip
+    turns = [quoted(roles[q].header) for q in ("speed", "position") if q in roles and roles[q].end in TURNING]
+    if linear and turns:
+        straight = next(quoted(c.header) for c in roles.values() if c.end in LINEAR)
+        raise ArmidError(f"{tables[0].where}: {straight} tells of a machine that moves straight and {turns[0]} of one "
+                         "that turns, which armid has no plant for: a plant of your own by `armid new plant` is "
+                         "expected")  # fmt: skip
     known = ", ".join(unit for unit in (*UNIT_ENDS, *DRIVEN_IN) if " " not in unit)
     for column in roles.values():
         if column.unit:

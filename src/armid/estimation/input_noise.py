@@ -17,13 +17,15 @@ from scipy.ndimage import uniform_filter1d
 from armid.model import Array
 from armid.problem.problem import ReadyRecord, Replay, by_record
 from armid.record import Piece, Record
-from armid.record.sensor import InputNoise
+from armid.record.sensor import InputNoise, Mask, lengths_of_rest
 
 # Drawn errors, and their seed.
 DRAWS, SEED = 16, 1
 # Second differences that share a size, and steps towards these sizes.
 SHARING, ROUNDS = 9, 40
-# Least variance of a second difference, in that of the noise.
+# Weights of neighbours in first and second differences.
+CHANGE, BEND = (-1.0, 1.0), (1.0, -2.0, 1.0)
+# Least variance of a difference, in that of the noise.
 STRAIGHTEST = 1e-12
 # Cosines that are tried at once, and at most: fast errors move a machine least. Sum of squares, in units of the noise,
 # from which on samples see a signal.
@@ -36,32 +38,35 @@ ROUNDING = 1e-9
 class Smoothed:
     """Hold what is known of an input that was measured with noise: it is normal about an estimate.
 
-    values: the estimate [unit of the input], (n,). variance: of the noise. bends: precision of each second difference
-    of the input, (n - 2,). factor: Cholesky factor of the precision of the input, banded, (3, n).
+    values: the estimate [unit of the input], (n,). variance: of the noise. differences: weights of neighbours, and the
+    precision of each such difference of the input. factor: Cholesky factor of the precision of the input, banded,
+    (3, n).
     """
 
     values: Array
     variance: float
-    bends: Array
+    differences: tuple[tuple[tuple[float, ...], Array], ...]
     factor: Array
 
     @classmethod
-    def of(cls, measured: Array, variance: float, bends: Array) -> "Smoothed":
+    def of(cls, measured: Array, variance: float, *differences: tuple[tuple[float, ...], Array]) -> "Smoothed":
         precision = np.zeros((3, measured.size))
         precision[2] = 1.0 / variance
-        for first, weight in enumerate((1.0, -2.0, 1.0)):
-            for second in range(first, 3):
-                row = precision[2 - (second - first)]
-                row[second : second + bends.size] += weight * (1.0, -2.0, 1.0)[second] * bends
+        for weights, sizes in differences:
+            for first, weight in enumerate(weights):
+                for second in range(first, len(weights)):
+                    row = precision[2 - (second - first)]
+                    row[second : second + sizes.size] += weight * weights[second] * sizes
         factor = cholesky_banded(precision)
-        return cls(cho_solve_banded((factor, False), measured / variance), variance, bends, factor)
+        return cls(cho_solve_banded((factor, False), measured / variance), variance, differences, factor)
 
     def errors(self, n: int, rng: np.random.Generator) -> Array:
         """Return drawn errors of the estimate, (n_samples, n)."""
         drawn = rng.standard_normal((self.values.size, n)) / np.sqrt(self.variance)
-        bent = np.sqrt(self.bends)[:, np.newaxis] * rng.standard_normal((self.bends.size, n))
-        for first, weight in enumerate((1.0, -2.0, 1.0)):
-            drawn[first : first + self.bends.size] += weight * bent
+        for weights, sizes in self.differences:
+            moved = np.sqrt(sizes)[:, np.newaxis] * rng.standard_normal((sizes.size, n))
+            for first, weight in enumerate(weights):
+                drawn[first : first + sizes.size] += weight * moved
         return self.solved(drawn)
 
     def covariance(self, waves: Array, step: float) -> Array:
@@ -80,24 +85,42 @@ class Smoothed:
         return np.asarray(cho_solve_banded((self.factor, False), columns))
 
 
-def smoothed(values: Array, noise: InputNoise) -> Smoothed:
+def smoothed(values: Array, noise: InputNoise, still: Mask) -> Smoothed:
     """Return the estimate of an input that was measured with noise, (n_samples,).
 
     Its second differences are normal, with a size that neighbours share: it is large at a jump and small at rest. The
     sizes are those under which the column is most probable (expectation and maximisation, by drawn errors).
+    still: where it is constant, (n_samples,).
     """
-    return smoothed_bytes(values.tobytes(), noise)
+    return smoothed_bytes(values.tobytes(), noise, still.tobytes())
 
 
 @lru_cache(maxsize=64)  # whole and cut pieces, and many models, ask for the same columns
-def smoothed_bytes(column: bytes, noise: InputNoise) -> Smoothed:
+def smoothed_bytes(column: bytes, noise: InputNoise, still: bytes) -> Smoothed:
     values, variance = np.frombuffer(column), noise.rms**2 + noise.step**2 / 12.0
+    stays = np.frombuffer(still, dtype=np.bool_)
+    steps = CHANGE, (stays[1:] & stays[:-1]) / (STRAIGHTEST * variance)
     rng, bends = np.random.default_rng(SEED), np.full(values.size - 2, 1.0 / variance)
     for _ in range(ROUNDS):
-        now = Smoothed.of(values, variance, bends)
+        now = Smoothed.of(values, variance, (BEND, bends), steps)
         squares = np.diff(now.values, 2) ** 2 + np.mean(np.diff(now.errors(DRAWS, rng), 2, axis=0) ** 2, axis=1)
         bends = 1.0 / np.maximum(uniform_filter1d(squares, SHARING, mode="nearest"), STRAIGHTEST * variance)
-    return Smoothed.of(values, variance, bends)
+    return Smoothed.of(values, variance, (BEND, bends), steps)
+
+
+def at_rest(record: Record, piece: Piece, values: Array) -> Mask:
+    """Return where an input and the machine stand still, at the begin and the end of a piece, (n_samples,).
+
+    There the input is constant: a machine that noise of the drive moved would not stand still. Of growing lengths the
+    last but one counts, as the drive may begin before this shows.
+    """
+    outputs = [(piece.of(s.measured), s.is_speed) for s in record.signals]
+    columns = [(values, 0.0, False), *((y, float(np.max(np.abs(y))), is_speed) for y, is_speed in outputs)]
+    still = np.zeros(values.size, dtype=np.bool_)
+    for way in (slice(None), slice(None, None, -1)):
+        _, n, *_ = [0, 0, *lengths_of_rest([(x[way], size, is_speed) for x, size, is_speed in columns])][::-1]
+        still[way][:n] = True
+    return still
 
 
 def pooled_noise(records: Sequence[Record]) -> dict[str, InputNoise]:
@@ -120,7 +143,8 @@ def estimated(record: Record, noise: Mapping[str, InputNoise]) -> Record:
     def driven(piece: Piece) -> Piece:
         if piece.smoothed:
             return piece
-        found = {name: smoothed(piece.manoeuvre.inputs[name], of) for name, of in noise.items()}
+        inputs = {name: piece.manoeuvre.inputs[name] for name in noise}
+        found = {name: smoothed(u, noise[name], at_rest(record, piece, u)) for name, u in inputs.items()}
         return with_inputs(replace(piece, smoothed=found), {name: one.values for name, one in found.items()})
 
     return record.with_pieces(driven)

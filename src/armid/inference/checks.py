@@ -14,7 +14,7 @@ from armid.estimation.constants import columns_of, moved_record, slopes_of_const
 from armid.estimation.identify import JointErrors, campaign_errors
 from armid.estimation.information import start_changes
 from armid.estimation.input_noise import estimated, pooled_noise
-from armid.inference.decisions import CERTAIN, SIGNIFICANCE
+from armid.inference.decisions import SIGNIFICANCE
 from armid.inference.library import Library, calibrated_replays
 from armid.inference.model import Fit, beyond, decomposed
 from armid.inference.whitening import WhitenedData, WhiteRecords, whitened, with_answers
@@ -30,6 +30,8 @@ INDEPENDENT, FEWEST_ORDINATES = 0.5, 4
 # Frequencies of mains and number of their harmonics. LINE: power of a line of a rest over that of its neighbours;
 # BESIDE: distance of these, in widths 1/T of the rest.
 MAINS_HZ, HARMONICS, LINE, BESIDE = (50.0, 60.0), 5, 4.0, 3.0
+# So small a p-value stays significant whatever the number of tests.
+CERTAIN = 1e-7
 # Products of columns whose share of the largest is below this are rounding.
 DEPENDENT = 1e-11
 # Share of the samples of a record over which lines are drawn where they are no data.
@@ -211,11 +213,6 @@ def is_significant(fit: Fit) -> bool:
     seen = train_residuals(fit)
     finding = next(size_tests(seen), None)
     return (finding is not None and finding.p < CERTAIN) or seen.diagnosis.significant
-
-
-def is_certain(fit: Fit) -> bool:
-    """Tell whether what a model leaves on train is more than noise beyond doubt."""
-    return train_residuals(fit).diagnosis.p < CERTAIN
 
 
 def holdout_residuals(fit: Fit, records: tuple[Record, ...], library: Library) -> Residuals | None:

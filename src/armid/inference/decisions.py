@@ -25,8 +25,6 @@ DENIED = 1.02
 OVER_NOISE = 1.1
 # Probability of a false alarm of the tests for whiteness, all together: one in 200 sound campaigns.
 SIGNIFICANCE = 0.005
-# p-value below which more than noise is left whatever the evidence says: no number of tests makes up for it.
-CERTAIN = 1e-7
 # Change of a record over its noise (rms) from which it is faulty: below it undoing a fault gains by smoothing alone.
 MOVES = 0.7
 # Log posterior odds within which models are expanded, and count as rivals for the next record (Madigan, Raftery 1994).

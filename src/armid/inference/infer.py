@@ -15,7 +15,7 @@ from armid.estimation.constants import NAMED
 from armid.estimation.information import NORMAL_95
 from armid.estimation.input_noise import estimated, pooled_noise
 from armid.estimation.least_squares import Estimates, descend, held_by_bound, spread_starts, with_fitted_starts
-from armid.estimation.noise_model import levels_left
+from armid.estimation.noise_model import NoiseModel, levels_left
 from armid.inference.candidates import constant_effects
 from armid.inference.carry_over import predicting_best
 from armid.inference.checks import is_significant, train_residuals
@@ -40,6 +40,8 @@ REACH = 16.0
 ALIKE = 2.0
 # How much wider a range becomes whose end holds a strength, and how often.
 WIDER, MOST_WIDENED = 8.0, 4
+# Share of what a model leaves, below which noise of the inputs is a trifle: a millionth of its square.
+TRIFLE = 1e-3
 # Shares of each record to which a first estimate is carried on.
 GROWING = (0.125, 0.25, 0.5, 0.75)
 # Names in the sentence that leads, and constants that are named as a cause of an interval's width.
@@ -281,26 +283,41 @@ def infer(library: Library, declared: Fit) -> Inference:
     with a prior. Models are explored in Occam's window; `evidence` says how a model gets its probability.
     """
     inference = inferred(library, declared)
-    if library.as_read is None:
+    if not pooled_noise(library.data.records):
         return inference
-    fit, exact = inference.exploration.fits[inference.in_force], library.with_data(library.as_read)
-    problem = exact.problem(fit.active, fit.values)
-    if fit_from(problem, fit.active, [start_of(problem, fit.values)]).log_density > fit.log_density:
-        library.say("the inputs count as exact: the records are more probable so")
-        return inferred(exact, declared_again(exact, declared))
-    if fit.active and inference.posterior.probability("unknown") >= MENTIONED and shows_inputs(fit):
+    fit, exact = inference.exploration.fits[inference.in_force], library
+    if library.as_read is not None:
+        exact = library.with_data(library.as_read)
+        problem = exact.problem(fit.active, fit.values)
+        if fit_from(problem, fit.active, [start_of(problem, fit.values)]).log_density > fit.log_density:
+            library.say("the inputs count as exact: the records are more probable so")
+            return inferred(exact, declared_again(exact, declared))
+    if fit.active and inference.posterior.probability("unknown") >= MENTIONED:
         # the declared model may answer to its inputs quite otherwise
-        library.say("the same with the noise of the inputs as the best model answers to it")
-        library = with_measured_inputs(exact, fit)
-        return inferred(library, declared_again(library, declared))
+        again = with_measured_inputs(exact, fit)
+        if shows_inputs(again, fit) and matters(again, fit):
+            library.say("the same with the noise of the inputs as the best model answers to it")
+            return inferred(again, declared_again(again, declared))
     return inference
 
 
-def shows_inputs(fit: Fit) -> bool:
-    """Tell whether what noise of the inputs does shows in what a model leaves."""
-    seen = train_residuals(fit)
-    levels = zip(seen.data.levels, seen.raw, strict=True)
-    return any(inputs_act(level.rms, level.moved, float(np.sqrt(np.mean(left**2)))) for level, left in levels)
+def shows_inputs(library: Library, fit: Fit) -> bool:
+    """Tell whether noise of the inputs moves an output by more than its sensor's, and shows in what a model leaves."""
+    return any(inputs_act(level.rms, level.moved, left) for level, left in moved_and_left(library, fit))
+
+
+def matters(library: Library, fit: Fit) -> bool:
+    """Tell whether what noise of the inputs does is more than a trifle of what a model leaves.
+
+    Where a model is far from right, fits that spare this noise would look at little else but its fastest changes.
+    """
+    return any(level.moved > TRIFLE * left for level, left in moved_and_left(library, fit))
+
+
+def moved_and_left(library: Library, fit: Fit) -> list[tuple[NoiseModel, float]]:
+    """Return of each signal its noise and what a model leaves of it, rms [its unit]."""
+    pairs = zip(library.data.levels, train_residuals(fit).raw, strict=True)
+    return [(level, float(np.sqrt(np.mean(left**2)))) for level, left in pairs]
 
 
 def inferred(library: Library, declared: Fit) -> Inference:
@@ -372,9 +389,11 @@ def with_input_noise(library: Library, declared: Fit) -> tuple[Library, Fit]:
     """Return the library whose inputs count as measured with noise, where this may show, and the declared fit."""
     if not pooled_noise(library.data.records) or not is_significant(declared):
         return library, declared
+    with_noise = with_measured_inputs(library, declared)
+    if not matters(with_noise, declared):
+        return library, declared
     library.say("taking the measured inputs as measured with noise")
-    library = with_measured_inputs(library, declared)
-    return library, declared_again(library, declared)
+    return with_noise, declared_again(with_noise, declared)
 
 
 def with_measured_inputs(library: Library, fit: Fit) -> Library:

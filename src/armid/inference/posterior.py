@@ -12,7 +12,7 @@ import numpy as np
 from scipy.special import logsumexp, ndtr
 
 from armid.estimation.least_squares import held_by_bound
-from armid.inference.checks import is_certain
+from armid.inference.checks import train_residuals
 from armid.inference.decisions import calibration
 from armid.inference.evidence import SCALES, Expansion, expansion_of
 from armid.inference.hypothesis import Hypotheses, log_prior
@@ -25,6 +25,8 @@ from armid.model import Array
 NEGLIGIBLE = float(np.log(1e-6))
 # Something that nobody knows, wherever it acts.
 UNSEEN = frozenset({("unknown", "output")})
+# A smaller p-value leaves no chance that arithmetic could hold.
+SMALLEST_P = 1e-12
 # What further unknowns of a model are, in words.
 CONSTANTS = "constants within tolerances"
 # How far unknowns are moved along an axis of their posterior, in deviations; how often, as a wider axis is looked at
@@ -166,7 +168,8 @@ class Posterior:
             return []
         away: dict[str, float] = {}
         for j, (atom, weight) in enumerate(zip(atoms, weights, strict=True)):
-            names = sorted(name for _, name in atom.names ^ best.names)
+            names = sorted(f"something unknown at {name}" if kind == "unknown" else name
+                           for kind, name in atom.names ^ best.names)  # fmt: skip
             more = weight * ((means[j] - means[first]) ** 2 + deviations[j] ** 2 - own)
             for name in names:
                 away[name] = away.get(name, 0.0) + float(more) / len(names)
@@ -186,21 +189,32 @@ def posterior(exploration: Exploration) -> Posterior:
     top = ranked[0][1]
     counted = [exploration.fits[model] for model, value in ranked if value >= top + NEGLIGIBLE]
     own = tuple(dict.fromkeys(n for fit in (exploration.declared, *counted) for n in fit.values))
-    # What the best model leaves beyond doubt has a covariance of its own: nobody knows what it is.
-    left = UNSEEN if is_certain(exploration.fits[ranked[0][0]]) else frozenset()
     for model, value in ranked:
         if value < top + NEGLIGIBLE:
             continue
         about = expansion_of(exploration.fits[model], scale, library)
         mean, covariance = of_parameters(about, own)
-        names = frozenset(h.public for h in model) | left
+        names = frozenset(h.public for h in model)
         atoms.append(Atom(value - log_prior(model), log_prior(model), names, mean, np.sqrt(np.diag(covariance))))
-        atoms += beside(exploration, model, value, about, own, mean, covariance, top, left)
+        atoms += beside(exploration, model, value, about, own, mean, covariance, top)
     fit = exploration.declared
     known = {n: span / np.sqrt(12.0) for f in (*counted, fit) for n, span in zip(f.values, f.records.span, strict=True)}
     known |= {name: deviation for name, (_, deviation) in library.known.items()}
     declared, before = (np.array([each.get(n, np.nan) for n in own]) for each in (fit.values, known))
-    return Posterior(tuple(atoms), own, calibration().temperature, declared, before)
+    mixture = Posterior(tuple(atoms), own, calibration().temperature, declared, before)
+    # What tests find beyond the best model, and no fitted signal explains, is something that nobody knows.
+    found = most_odds(train_residuals(exploration.fits[ranked[0][0]]).diagnosis.p) - 1.0
+    odds = calibration().expected["unseen"] * found
+    return mixture.with_unseen(odds / (1.0 + odds)) if found else mixture
+
+
+def most_odds(p: float) -> float:
+    """Return the largest Bayes factor against noise alone that a p-value allows, -1/(e p ln p).
+
+    Sellke, Bayarri and Berger 2001, doi:10.1198/000313001300339950.
+    """
+    p = max(p, SMALLEST_P)
+    return 1.0 if p >= np.exp(-1.0) else float(-1.0 / (np.e * p * np.log(p)))
 
 
 def of_parameters(about: Expansion, own: Sequence[str]) -> tuple[Array, Array]:
@@ -353,13 +367,13 @@ def room(z: Array, moves: Array) -> Array:
 
 def beside(
     exploration: Exploration, model: Hypotheses, value: float, about: Expansion, own: Sequence[str], mean: Array,
-    covariance: Array, top: float, left: frozenset[tuple[str, str]],
+    covariance: Array, top: float,
 ) -> list[Atom]:  # fmt: skip
     """Return the atoms of an expanded model with one hypothesis that was forecast and not fitted, to first order."""
     fit = about.fit
     places, held = places_of(own, fit)
     span, atoms = fit.records.span[places], []
-    names = frozenset(h.public for h in model) | left
+    names = frozenset(h.public for h in model)
     for ahead in exploration.forecasts.get(model, ()):
         hypothesis = ahead.proposal.hypothesis
         if model | {hypothesis} in exploration.fits or model | {hypothesis} in exploration.refused:

@@ -260,7 +260,7 @@ def verdicts_of(
     verdicts += [DISAGREES] if any(h.kind in ("record", "drift") for h in accused) else []
     in_doubt = any(s.probability < CLAIMED for s in steps) if steps else post.nothing < MENTIONED
     verdicts += [TOO_ALIKE] if in_doubt and not unknown and withdrawn is None and DISAGREES not in verdicts else []
-    if unknown or (after.diagnosis.significant and not verdicts):
+    if unknown:
         verdicts.append(PARTLY if steps else UNEXPLAINED)
     return tuple(verdicts) or (EXPLAINED if steps else NO_DISCREPANCY,)
 

@@ -11,7 +11,7 @@ from armid.estimation.identify import versions_of
 from armid.estimation.identify_document import PACKAGES
 from armid.inference.carry_over import missed_sentences
 from armid.inference.checks import Finding, Residuals, time_in_words
-from armid.inference.decisions import LISTED, MENTIONED, OVER_NOISE, SIGNIFICANCE
+from armid.inference.decisions import LISTED, OVER_NOISE, SIGNIFICANCE
 from armid.inference.hypothesis import words
 from armid.inference.infer import Inference, sentence_of
 from armid.inference.missing_signal import Missing
@@ -372,7 +372,7 @@ def conclusion(loop: ClosedLoop) -> str:
     names = " + ".join(loop.effects)
     return {
         NO_DISCREPANCY: nothing_missing(loop),
-        EXPLAINED: f"The declared model lacked {names}; with it, what remains is noise on {judged_on(loop)}.",
+        EXPLAINED: f"The declared model lacked {names}; with it, what remains {as_noise(loop)} on {judged_on(loop)}.",
         PARTLY: partly(loop),
     }[loop.verdict]
 
@@ -385,20 +385,21 @@ def unexplained(loop: ClosedLoop) -> str:
 
 
 def partly(loop: ClosedLoop) -> str:
-    names, unknown = " + ".join(loop.effects), loop.inference.posterior.probability("unknown")
-    lacks = "something that the library does not hold"
-    if unknown < MENTIONED:
-        return f"With {names} the declared model does better, but it lacks {lacks}{unclaimed(loop)}"
-    best = f"Of the models of names alone, that with {names} predicts parts left out of the fit best"
-    return f"The declared model lacks {lacks}. {best}{unclaimed(loop)}"
+    best = f"Of the models of names alone, that with {' + '.join(loop.effects)} predicts parts left out of the fit best"
+    return f"The declared model lacks something that the library does not hold. {best}{unclaimed(loop)}"
 
 
 def nothing_missing(loop: ClosedLoop) -> str:
-    if not loop.after.significant:
-        return "What the declared model leaves is noise: nothing is missing that these records could show."
+    if loop.after.diagnosis.significant or not loop.after.significant:
+        return f"What the declared model leaves {as_noise(loop)}: nothing is missing that these records could show."
     return ("What the declared model leaves on the train records is noise: nothing is missing that they could show. "
             f"Those held out are missed by more than noise, but by less than {OVER_NOISE:g} times, as a prediction may "
             "be.")  # fmt: skip
+
+
+def as_noise(loop: ClosedLoop) -> str:
+    seen = loop.after.diagnosis
+    return f"differs little from noise (chance {seen.p:.2g})" if seen.significant else "is noise"
 
 
 def unclaimed(loop: ClosedLoop) -> str:
@@ -429,7 +430,7 @@ def carried_sentence(loop: ClosedLoop) -> str:
     judged = loop.after if loop.withdrawn is None else loop.withdrawn.judged
     unseen = judged.holdout
     assert unseen is not None
-    factors = [float(np.sqrt(np.mean(raw**2))) / level.rms for raw, level in zip(unseen.raw, unseen.data.levels,
+    factors = [float(np.sqrt(np.mean(raw**2))) / level.total for raw, level in zip(unseen.raw, unseen.data.levels,
                                                                                  strict=True)]  # fmt: skip
     worst = int(np.argmax(np.nan_to_num(factors, nan=np.inf)))
     missed = f"{unseen.data.each[worst].file} is missed by {factors[worst]:.3g} times its noise"
@@ -520,8 +521,13 @@ def shift_sentences(before: Judgement, after: Judgement) -> list[str]:
 
 
 def doubt_sentences(judged: Judgement) -> list[str]:
-    reasons: dict[tuple[str, ...], list[str]] = {}
-    for e in judged.estimates:
-        if e.doubts and e.low is not None:
-            reasons.setdefault(e.doubts, []).append(e.name)
-    return [f"Not to be trusted: {', '.join(names)} ({'; '.join(why)})." for why, names in reasons.items()]
+    """Say which parameters are not to be trusted, and each reason once."""
+    doubted = [e for e in judged.estimates if e.doubts and e.low is not None]
+    if not doubted:
+        return []
+    reasons: dict[str, list[str]] = {}
+    for e in doubted:
+        for why in e.doubts:
+            reasons.setdefault(why, []).append(e.name)
+    said = [why if len(names) == len(doubted) else f"{why} ({', '.join(names)})" for why, names in reasons.items()]
+    return [f"Not to be trusted: {', '.join(e.name for e in doubted)}. Why: {'; '.join(said)}."]

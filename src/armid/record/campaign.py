@@ -431,7 +431,7 @@ def set_by_records(plant: Plant) -> set[str]:
 
 def largest_speed(record: Record) -> float:
     """Return the largest speed that a record of a speed or a position shows, SI, 0 for another output."""
-    if record.unit in ("rad/s", "m/s"):
+    if record.signals[0].is_speed:
         return float(np.max(np.abs(record.measured)))
     if record.unit not in ("rad", "m"):
         return 0.0

@@ -98,7 +98,7 @@ def input_noises(
     plant: Plant, table: CsvTable, sources: Mapping[str, str], measured: Sequence[tuple[Signal, Array]]
 ) -> dict[str, InputNoise]:  # fmt: skip
     """Return the noise of each input that was measured with some, SI; sources: input -> header of its column."""
-    outputs, noises = [(values, signal.unit in ("rad/s", "m/s")) for signal, values in measured], {}
+    outputs, noises = [(values, signal.is_speed) for signal, values in measured], {}
     for driven in plant.inputs:
         header = sources.get(driven.name)
         if header is not None:

@@ -125,6 +125,10 @@ class Signal:
     header: str = ""
     guessed: Mask | None = None
 
+    @property
+    def is_speed(self) -> bool:
+        return self.unit in ("rad/s", "m/s")
+
     def samples(self, piece: Piece) -> Samples:
         """Return the samples of a piece that fitness and errors see: those of its window that were measured."""
         if self.data is None:
