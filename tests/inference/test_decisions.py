@@ -28,7 +28,7 @@ NUMERICS = {
     ),
     "budgets of computing": ("APART", "MOST_IN_VAIN", "MOST_EFFECTS", "MOST_OF_SIZE", "MOST_RIVALS"),
     "estimate of the noise": ("FEWEST_FOR_COLOUR", "FEWEST_ORDINATES", "MOST_LAGS", "LINE", "MOST_BRIDGED", "STILL",
-                              "EVEN", "MISFIT", "ENGINE_ERRORS", "CHANCE", "CERTAIN"),
+                              "EVEN", "MISFIT", "ENGINE_ERRORS", "CHANCE", "CERTAIN", "TRIFLE"),
     "what can be asked of records at all": ("FEWEST", "MOVED", "SAME_PORT", "SAME_VARIABLE", "ALIKE"),
     "layout of pages": ("MOST_DRAWN", "MOST_CONSTANTS", "SHIFTED", "LEAST_SHARE", "WEAK", "VERSION"),
 }  # fmt: skip
