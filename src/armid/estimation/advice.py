@@ -28,8 +28,9 @@ Powers = Mapping[Pair, tuple[float, float]]
 THRESHOLD = 6.0
 # Draws of what the parameters may be: in the linear prediction, and of each rival whose record is simulated.
 N_DRAWS, N_REFIT_DRAWS = 512, 4
-# So many fits all simulations may take; it decides how many manoeuvres are simulated, but not below the fewest.
-MOST_FITS, FEWEST = 160, 4
+# So many fits all simulations may take, each of so many samples; it decides how many manoeuvres are simulated, but not
+# below the fewest.
+MOST_FITS, OF_SAMPLES, FEWEST = 160, 6000, 2
 # Rivals that a manoeuvre tells apart no more often than this are not listed as separated by it.
 OFTEN = 0.5
 TOLERANCE = 1e-3
@@ -132,7 +133,8 @@ def advise(
     draws = normal_draws(1 + sum(len(r.z) for r in rivals), N_DRAWS)
     possible = [f for f in grid if all(f in known for known in predictions)]
     powers = {f: predicted_powers(rivals, [p[f] for p in predictions], draws) for f in possible}
-    most = max(MOST_FITS // (len(rivals) ** 2 * N_REFIT_DRAWS), FEWEST)
+    fits = int(MOST_FITS * min(OF_SAMPLES / len(first.measured), 1.0))
+    most = max(fits // (len(rivals) ** 2 * N_REFIT_DRAWS), FEWEST)
     promising = sorted(possible, key=lambda f: rank(mean_of(powers[f], 0), powers[f]), reverse=True)[:most]
     draws = normal_draws(max(len(r.z) for r in rivals), N_REFIT_DRAWS)
     outcomes = side_by_side(lambda f: simulated(rivals, f, white, draws), promising, threads)
