@@ -11,7 +11,7 @@ import pytest
 
 import armid
 from armid.cli.main import main
-from armid.cli.new import KINDS
+from armid.cli.new import NEW_KINDS
 from armid.model import EFFECTS, PLANTS
 from armid.registry import load_plugin, load_registry
 
@@ -48,7 +48,7 @@ def test_starting_files_of_then_and_now_pass_their_contract(kind, capsys, tmp_pa
 def test_every_kind_of_starting_file_that_is_frozen_is_still_there():
     frozen = {path.stem.removeprefix("my_") for path in (*FROZEN.glob("my_*.py"), *FROZEN.glob("campaigns/my_*"))}
     assert len(frozen) == 5
-    assert frozen <= set(KINDS)
+    assert frozen <= set(NEW_KINDS)
 
 
 def test_a_starting_campaign_holds(capsys):

@@ -1,9 +1,12 @@
 """Every public name can be imported and says what it is."""
 
+import ast
 import importlib
 import inspect
 import pkgutil
 import re
+from collections import defaultdict
+from pathlib import Path
 
 import click
 
@@ -57,3 +60,25 @@ def test_exported_functions_tell_every_parameter_and_what_they_return():
             told = {word.strip(" *") for line in re.findall(r"^[^\s:].*", section, re.MULTILINE)
                     for word in line.partition(" :")[0].split(",")}  # fmt: skip
             assert told == set(inspect.signature(function).parameters), name
+
+
+# What each file of a kind brings under the same name: effects, a statistic, the figures of a page.
+SLOTS = {"EFFECTS", "COLUMNS", "FIGURES", "FIGURE_CAPTION", "TABLE_CAPTION"}
+
+
+def constants_of(file):
+    for node in ast.parse(file.read_text()).body:
+        targets = node.targets if isinstance(node, ast.Assign) else [getattr(node, "target", None)]
+        for target in targets:
+            names = target.elts if isinstance(target, ast.Tuple) else [target]
+            yield from (n.id for n in names if isinstance(n, ast.Name) and n.id.isupper() and len(n.id) > 1)
+
+
+def test_a_constant_is_defined_in_one_file():
+    root = Path(armid.__file__).parent
+    homes = defaultdict(set)
+    for file in root.rglob("*.py"):
+        for name in constants_of(file):
+            homes[name].add(str(file.relative_to(root)))
+    assert {name: files for name, files in homes.items() if len(files) > 1 and name not in SLOTS} == {}
+    assert all(len(homes[name]) > 1 for name in SLOTS)

@@ -6,7 +6,8 @@ import signal
 import sys
 from contextlib import suppress
 
-from armid.cli.start import INTERRUPTED, end_on_request, open_closed_streams
+from armid.cli.start import end_on_request, open_closed_streams
+from armid.errors import INTERRUPTED
 
 
 def run() -> None:

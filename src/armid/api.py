@@ -51,7 +51,7 @@ Bounds: TypeAlias = Mapping[str, tuple[float, float]]
 Window: TypeAlias = tuple[float, float]
 # Of studies/benchmark.toml (30 arms, 20 identifiers, with and without noise) no identifier ends nearer to the truth
 # than this one on the rmse with 3,000 simulations, and the swarm before it looks at the whole box.
-IDENTIFIER, FITNESS, BUDGET = "pso+least_squares", "rmse", 3_000
+IDENTIFIER, USUAL_FITNESS, USUAL_BUDGET = "pso+least_squares", "rmse", 3_000
 # Where the fitness is not a sum of squares: the best optimiser that needs no residual vectors.
 WITHOUT_RESIDUALS = "cmaes"
 # The paper's section IV: swarm, similarity degree, 150 iterations of 80 particles, the first 0.7 s.
@@ -251,13 +251,13 @@ def identify(
         raise ArmidError(f"options is {quoted(options)}: name -> value is expected")
     window = PAPER_WINDOW if paper and window is None else window
     setup = opened(campaign, effects, plugins, window, bounds, fix, plant, model, units)
-    fitness = fitness or (PAPER_FITNESS if paper else FITNESS)
+    fitness = fitness or (PAPER_FITNESS if paper else USUAL_FITNESS)
     distance = (fitness_of_name(fitness, setup.registry.fitness) if isinstance(fitness, str) else
                 as_fitness(name_of(fitness, getattr(fitness, "__name__", "own")), fitness))  # fmt: skip
     by_default = PAPER_IDENTIFIER if paper else IDENTIFIER if distance.weigh is not None else WITHOUT_RESIDUALS
     searcher = identifier_of(identifier or by_default, setup.registry).with_options(options or {})
     if budget is None:
-        budget = PAPER_BUDGET if paper or identifier is not None else BUDGET
+        budget = PAPER_BUDGET if paper or identifier is not None else USUAL_BUDGET
     space = space or setup.space()
     with angles_in(setup.campaign.angle):
         issues = data_issues(setup.campaign, setup.model, space)

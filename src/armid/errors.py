@@ -6,7 +6,9 @@ from contextlib import contextmanager
 from difflib import get_close_matches
 
 # Letters of a sentence at most, and those of its end, where it says what is expected.
-LONGEST, END = 300, 120
+LONGEST_SENTENCE, END = 300, 120
+# Exit code of what was interrupted.
+INTERRUPTED = 130
 
 
 class ArmidError(ValueError):
@@ -58,7 +60,7 @@ def printable(text: str) -> str:
 def on_a_line(sentence: str) -> str:
     """Return a sentence of at most 300 letters on one line, see `printable`."""
     line = printable(sentence)
-    return line if len(line) <= LONGEST else f"{line[: LONGEST - END - 5]} ... {line[-END:]}"
+    return line if len(line) <= LONGEST_SENTENCE else f"{line[: LONGEST_SENTENCE - END - 5]} ... {line[-END:]}"
 
 
 # Longest list of valid words that a message shows in full [letters].

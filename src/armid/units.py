@@ -21,7 +21,7 @@ _angle: ContextVar[str] = ContextVar("angle", default=DEG)
 # SI units that take a prefix, and from which sizes on: below a hundredth, and from ten thousand.
 PREFIXED = re.compile(r"(N|V|A|W|J|H|F|ohm)(?![a-z])|s$")
 PREFIXES = {1e-9: "n", 1e-6: "u", 1e-3: "m", 1e3: "k", 1e6: "M", 1e9: "G"}
-LEAST, LARGEST = 1e-2, 1e4
+LEAST_PLAIN, LARGEST_PLAIN = 1e-2, 1e4
 # End of the header of a column -> SI unit, factor into it, and how a row of units or brackets in a header write it. The
 # factor of counts is that of the shaft's encoder: a turn over `counts_per_turn` of the campaign.
 ENDS = {
@@ -67,7 +67,7 @@ def scale_of(unit: str, size: float = 1.0) -> tuple[str, float]:
     ('uN m', 1000000.0)
     """
     scale = (SHOWN | ANGLES[_angle.get()]).get(unit, (unit, 1.0))
-    is_readable = not np.isfinite(size) or size == 0.0 or LEAST <= abs(size) < LARGEST
+    is_readable = not np.isfinite(size) or size == 0.0 or LEAST_PLAIN <= abs(size) < LARGEST_PLAIN
     if scale[0] != unit or is_readable or not PREFIXED.match(unit):
         return scale
     sizes = [prefix for prefix in PREFIXES if prefix <= abs(size)]

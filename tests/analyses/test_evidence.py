@@ -15,7 +15,7 @@ from armid.study.analyses.analysis import (
     remaining_share,
     wide_runs,
 )
-from armid.study.analyses.success import TOLERANCES
+from armid.study.analyses.success import SUCCESS_TOLERANCES
 
 
 def test_a_label_on_one_fitness_keeps_its_name_and_on_several_tells_which(made):
@@ -110,7 +110,7 @@ def test_a_target_hit_and_left_again_is_hit_and_an_error_that_is_not_known_hits_
 
 def test_the_tolerances_of_the_success_rates_are_targets():
     assert len(TARGETS) == 51
-    assert all((np.abs(TARGETS / t - 1.0) < 1e-12).any() for t in TOLERANCES)
+    assert all((np.abs(TARGETS / t - 1.0) < 1e-12).any() for t in SUCCESS_TOLERANCES)
 
 
 def test_a_share_is_the_convergence_test_of_more_and_wild():

@@ -6,7 +6,7 @@ import warnings
 import numpy as np
 import pytest
 
-from armid.study.export import WORST, export_ioh, lines
+from armid.study.export import WORST_VALUE, export_ioh, lines
 from armid.study.store import RunTrace
 
 
@@ -74,8 +74,8 @@ def test_its_own_analysis_runs(loaded):
 
 def test_a_first_candidate_that_failed_is_logged_as_worst_and_an_early_end_is_logged():
     trace = RunTrace("r", np.array([3]), np.array([0.5]), np.array([[1.0]]), ("k",))
-    assert list(lines(trace, 7)) == [f"1 {WORST!r} nan\n", "3 0.5 1.0\n", "7 0.5 1.0\n"]
-    assert list(lines(trace, 3)) == [f"1 {WORST!r} nan\n", "3 0.5 1.0\n"]
+    assert list(lines(trace, 7)) == [f"1 {WORST_VALUE!r} nan\n", "3 0.5 1.0\n", "7 0.5 1.0\n"]
+    assert list(lines(trace, 3)) == [f"1 {WORST_VALUE!r} nan\n", "3 0.5 1.0\n"]
 
 
 def test_such_a_run_loads(tmp_path, made):
@@ -88,7 +88,7 @@ def test_such_a_run_loads(tmp_path, made):
     manager.add_folder(str(tmp_path))
     rows = manager.load(monotonic=False, include_meta_data=True).to_pandas()
     first = rows[rows["function_name"].str.startswith("row 1")].iloc[0]
-    assert (first["evaluations"], first["raw_y"]) == (1, WORST)
+    assert (first["evaluations"], first["raw_y"]) == (1, WORST_VALUE)
 
 
 def test_no_text_of_a_study_file_is_given_to_a_program_that_evaluates_it(exported):

@@ -13,7 +13,7 @@ from armid.report.style import line_look
 from armid.study.analyses.analysis import Evidence
 from armid.study.analyses.cramer_rao import CRAMER_RAO, LEAST_REALISATIONS
 from armid.study.analyses.errors import (
-    MOST_POINTS,
+    MOST_ERRORS_DRAWN,
     brief,
     colour_range,
     end_points,
@@ -178,7 +178,7 @@ def test_figure_draws_every_run_once_a_pair_and_of_very_many_every_nth(evidence)
     assert sum(len(line.get_xdata()) for line in pair.lines) == len(ends)
     plt.close(figure)
     many = ends.loc[np.repeat(ends.index, 100)].reset_index()
-    assert thinned(many).groupby("variant").size().max() <= MOST_POINTS
+    assert thinned(many).groupby("variant").size().max() <= MOST_ERRORS_DRAWN
 
 
 def test_the_colours_of_the_map_span_the_errors_shown():

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from armid.report.style import MOST_NAMED, PALE, named_lines, panels
+from armid.report.style import MOST_COLOURED, PALE, named_lines, panels
 from armid.study.analyses.analysis import TARGETS
 from armid.study.analyses.convergence import convergence_figure, median
 from armid.study.analyses.running_time import (
@@ -75,7 +75,7 @@ def test_the_first_six_lines_have_a_colour_each_and_all_others_are_grey():
     assert [t.get_text() for t in axis.texts] == ["v8", "v7", "v6", "v5", "v4", "v3", "others (3)"]
     colours = {line.get_ydata()[1]: line.get_color() for line in axis.lines[:9]}
     assert [colours[i] for i in (0.0, 1.0, 2.0)] == [PALE] * 3
-    assert len({colours[float(i)] for i in range(3, 9)}) == MOST_NAMED
+    assert len({colours[float(i)] for i in range(3, 9)}) == MOST_COLOURED
     plt.close(figure)
 
 

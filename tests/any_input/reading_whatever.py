@@ -11,7 +11,7 @@ import numpy as np
 from hypothesis import settings
 from hypothesis import strategies as st
 
-from armid.errors import LONGEST, ArmidError
+from armid.errors import LONGEST_SENTENCE, ArmidError
 from armid.record import Campaign, RecordWarning, read_campaign
 from input_texts import LOWERING
 
@@ -67,7 +67,7 @@ def outcome(work):
         return work()
     except ArmidError as error:
         sentence = str(error)
-    assert 0 < len(sentence) <= LONGEST
+    assert 0 < len(sentence) <= LONGEST_SENTENCE
     assert "\n" not in sentence
     return None
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from armid.errors import LONGEST
+from armid.errors import LONGEST_SENTENCE
 
 OUT = {"close-loop": ["--out", "out"], "simulate": ["--out", "out"]}
 COMMANDS = ("identify", "close-loop", "identifiability", "simulate", "check")
@@ -68,7 +68,9 @@ def test_refusals(refused, paper_arm_folder, mine):
 def test_a_long_word_makes_no_long_sentence(refused, paper_arm_folder, words):
     """What is expected stands at the end, and is kept."""
     sentence = refused(*[paper_arm_folder if word == "ARM" else word for word in words])
-    assert re.search(r"expected|expects|known|did you mean|--help|too long", sentence[-LONGEST // 2 :]), sentence
+    assert re.search(r"expected|expects|known|did you mean|--help|too long", sentence[-LONGEST_SENTENCE // 2 :]), (
+        sentence
+    )
 
 
 def test_truth_values_are_options(run, paper_arm_folder):

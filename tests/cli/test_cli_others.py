@@ -14,7 +14,7 @@ import pytest
 from click.shell_completion import ShellComplete
 
 from armid.cli.main import Commands, app
-from armid.cli.new import KINDS
+from armid.cli.new import NEW_KINDS
 from armid.model import EFFECTS
 from armid.study.runner import TIME_LIMIT_S
 
@@ -259,7 +259,7 @@ def test_the_friction_that_the_campaign_s_text_names_is_in_its_records(run):
 
 
 def test_nothing_is_overwritten(run, refused, tmp_path):
-    for kind in KINDS:
+    for kind in NEW_KINDS:
         assert run("new", kind, "mine", "--out", kind).code == 0
         before = {p: p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()}
         assert "exists already" in refused("new", kind, "mine", "--out", kind)

@@ -41,7 +41,7 @@ def test_a_long_record_is_calibrated_in_parts(
 ) -> None:
     spread = probes(*box_of(arm))
     whole = calibrate(arm, manoeuvres["lower"], spread, spans=False)
-    monkeypatch.setattr(import_module("armid.engine.calibrate"), "MOST_VALUES", 1000)
+    monkeypatch.setattr(import_module("armid.engine.calibrate"), "MOST_OF_PROBES", 1000)
     parts = calibrate(arm, manoeuvres["lower"], spread)
     assert parts.schedule.substeps == whole.schedule.substeps
     assert parts.schedule.plan is None

@@ -8,7 +8,7 @@ import pytest
 
 from arm_cases import Array, drawn
 from armid.engine import Schedule, simulate
-from armid.engine.generate import FEWEST, strengths_of
+from armid.engine.generate import FEWEST_IDLE, strengths_of
 from armid.model import EFFECTS, Manoeuvre, Model, applicable
 
 pytestmark = pytest.mark.slow
@@ -37,7 +37,7 @@ def using(wide: Model, plain: Array, name: str, share: float = 0.3) -> Array:
 
 
 def test_a_small_model_evaluates_every_effect(arm: Model, wide: Model) -> None:
-    assert len(NAMES) == FEWEST
+    assert len(NAMES) == FEWEST_IDLE
     least = Model(arm.plant, tuple(EFFECTS[n] for n in NAMES))
     assert not strengths_of(Model(arm.plant, least.effects[1:]))
     assert set(strengths_of(least)) == set(NAMES) < set(strengths_of(wide))

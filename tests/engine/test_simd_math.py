@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from armid.engine import simd_math as lane_numpy
 from armid.engine.simd import make_access, store
-from armid.engine.simd_math import FAR
+from armid.engine.simd_math import FAR_ANGLE
 
 Array = NDArray[np.float64]
 WIDTH = 8
@@ -75,7 +75,7 @@ def subnormal(*values: Array) -> NDArray[np.bool_]:
 
 
 ANY, TWO = single(spread()), pairs(spread())
-ANGLES = single(spread(1e-12, FAR))
+ANGLES = single(spread(1e-12, FAR_ANGLE))
 SQUARES = without(pairs(spread(1e-140, 1e140)), square_leaves_range)
 POWERS = pairs(np.concatenate([spread(1e-6, 1e6), np.arange(-6.0, 7.0)]))
 

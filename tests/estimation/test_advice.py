@@ -10,8 +10,8 @@ from scipy.stats import multivariate_normal
 from armid.engine import Calibration, Schedule, simulate
 from armid.errors import ArmidError
 from armid.estimation.advice import (
+    BETTER_BY,
     OFTEN,
-    THRESHOLD,
     Advice,
     Prediction,
     Rival,
@@ -66,7 +66,7 @@ def brute_force(rivals, old, new, seen, rng, n=1500):
         z = right.z + right.root @ rng.normal(size=3)
         record = np.concatenate([seen, new[0] @ z + rng.normal(size=25)])
         d = least(np.vstack([old[1], new[1]]), record) - least(np.vstack([old[0], new[0]]), record)
-        wins += d > THRESHOLD
+        wins += d > BETTER_BY
     return wins / n
 
 
@@ -246,7 +246,7 @@ def test_the_advised_record_tells_apart_and_beats_a_random_one(models, stroke):
             again = {r.name: fitted(r.name, models[r.name], [old, new], r.records.values(r.z)) for r in rivals}
             wrong = next(name for name in models if name != right)
             margins[how].append(again[wrong].criterion - again[right].criterion)
-    won = {how: np.mean(np.array(values) > THRESHOLD) for how, values in margins.items()}
+    won = {how: np.mean(np.array(values) > BETTER_BY) for how, values in margins.items()}
     assert won["advised"] >= 0.8
     assert won["advised"] >= won["random"]
     assert np.median(margins["advised"]) > 2.0 * np.median(margins["random"])

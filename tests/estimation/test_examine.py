@@ -18,7 +18,7 @@ from armid.estimation.identifiability_document import (
     result_of,
     smooth,
 )
-from armid.estimation.information import THRESHOLD, information_at
+from armid.estimation.information import PROFILE_RISE, information_at
 from armid.estimation.least_squares import estimate
 from armid.model import EFFECTS
 from armid.problem.problem import replays
@@ -202,7 +202,7 @@ def test_a_profile_is_drawn_with_its_threshold_its_parabola_and_its_bound(with_f
     draw_profile(axis, profile)
     drawn = {line.get_label(): line for line in axis.lines}
     assert set(drawn) == {"by curvature", "profile", "fitted again", "95 % threshold", "bound of the box", "estimate"}
-    assert drawn["95 % threshold"].get_ydata()[0] == THRESHOLD
+    assert drawn["95 % threshold"].get_ydata()[0] == PROFILE_RISE
     parabola = drawn["by curvature"]
     expected = ((parabola.get_xdata() - profile.estimate) / profile.deviation) ** 2
     np.testing.assert_allclose(parabola.get_ydata(), expected)

@@ -6,7 +6,7 @@ from linear_records import linear_records
 from scipy.optimize import lsq_linear
 from scipy.stats import chi2
 
-from armid.estimation.information import THRESHOLD, profiles
+from armid.estimation.information import PROFILE_RISE, profiles
 from armid.estimation.least_squares import fit
 
 
@@ -15,7 +15,7 @@ def seen_by(design, z, rng):
 
 
 def test_of_a_linear_model_it_is_the_parabola():
-    assert pytest.approx(chi2.ppf(0.95, 1)) == THRESHOLD
+    assert pytest.approx(chi2.ppf(0.95, 1)) == PROFILE_RISE
     rng = np.random.default_rng(3)
     design = 60.0 * rng.normal(size=(50, 3))
     design[:, 1] += 2.0 * design[:, 0]
@@ -30,7 +30,7 @@ def test_of_a_linear_model_it_is_the_parabola():
         np.testing.assert_allclose([p.low, p.high], p.estimate + np.array([-1, 1]) * 1.95996 * d, atol=2e-3 * d)
         np.testing.assert_allclose(p.rise, ((p.values - p.estimate) / d) ** 2, atol=1e-5)
         assert (np.diff(p.values) >= 0.0).all()
-        assert p.rise[[0, -1]].min() > THRESHOLD
+        assert p.rise[[0, -1]].min() > PROFILE_RISE
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -71,7 +71,7 @@ def test_an_estimate_on_its_bound_is_open_there():
     assert held.bounded == (False, True)
     assert held.estimate == held.low == 10.0
     # (30 z + 1.5)^2 - 1.5^2 = 3.84
-    assert held.high == pytest.approx(10.0 + 10.0 * (np.sqrt(THRESHOLD + 2.25) - 1.5) / 30.0, abs=2e-3)
+    assert held.high == pytest.approx(10.0 + 10.0 * (np.sqrt(PROFILE_RISE + 2.25) - 1.5) / 30.0, abs=2e-3)
     assert len(held.values) > 5
 
 

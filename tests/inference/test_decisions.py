@@ -14,23 +14,16 @@ FILES = sorted([*(SRC / "loop").glob("*.py"), *(SRC / "inference").rglob("*.py")
 MOST = 20
 # Constants that are compared with and decide nothing that a user is told, by what they are.
 NUMERICS = {
-    "rounding": ("DEPENDENT", "NEGLIGIBLE", "ROUNDING", "ROUGHLY", "LEAST", "SAME_RESPONSE"),
-    "whether differences tell a slope": ("BELIEVED", "LEAST_RISE", "PARALLEL", "BENT", "FOLLOWED"),
-    "convergence of fits and of the engine": (
-        "SETTLED",
-        "NEAR",
-        "FEWEST_SPARED",
-        "FURTHER_ERROR",
-        "WIDE",
-        "REACH",
-        "LARGEST",
-        "FORETOLD",
-    ),
-    "budgets of computing": ("APART", "MOST_IN_VAIN", "MOST_EFFECTS", "MOST_OF_SIZE", "MOST_RIVALS"),
-    "estimate of the noise": ("FEWEST_FOR_COLOUR", "FEWEST_ORDINATES", "MOST_LAGS", "LINE", "MOST_BRIDGED", "STILL",
-                              "EVEN", "MISFIT", "ENGINE_ERRORS", "CHANCE", "CERTAIN", "TRIFLE"),
-    "what can be asked of records at all": ("FEWEST", "MOVED", "SAME_PORT", "SAME_VARIABLE", "ALIKE"),
-    "layout of pages": ("MOST_DRAWN", "MOST_CONSTANTS", "SHIFTED", "LEAST_SHARE", "WEAK", "VERSION"),
+    "rounding": ("DEPENDENT", "NEGLIGIBLE", "ROUNDING_OF_SIGNAL", "ROUGHLY", "LEAST_CHANCE", "SAME_RESPONSE"),
+    "whether differences tell a slope": ("BELIEVED", "LEAST_RISE", "PARALLEL", "BENT_RISE", "FOLLOWED"),
+    "convergence of fits and of the engine": ("SETTLED_COST", "NEAR_NOISE", "FEWEST_SPARED", "FURTHER_ERROR",
+                                              "WIDE", "FORETOLD"),
+    "budgets of computing": ("FEWEST_IN_BUNDLES", "MOST_IN_VAIN", "MOST_EFFECTS", "MOST_OF_SIZE", "MOST_RIVALS"),
+    "estimate of the noise": ("FEWEST_FOR_COLOUR", "FEWEST_ORDINATES", "MOST_LAGS_OF_NOISE", "LINE_OF_MAINS",
+                              "MOST_BRIDGED", "STILL", "EVEN_SPEED", "MISFIT", "ENGINE_ERRORS", "CHANCE_OF_COLOUR",
+                              "CERTAIN", "TRIFLE"),
+    "what can be asked of records at all": ("FEWEST_RECORDS", "MOVED", "SAME_PORT", "SAME_VARIABLE", "SAME_ORDER"),
+    "layout of pages": ("MOST_DRAWN", "MOST_CONSTANTS", "SHIFTED", "LEAST_SHARE", "WEAK", "REPORT_VERSION"),
 }  # fmt: skip
 # Plain numbers in comparisons that are no decision either: a half, rounding, and where a series or a range turns.
 LITERALS = {0, 1, 2, 3, -1, 0.5, 1.5, 5.0, 0.05, 1e-7, 1e-9, 1e-12, 1e-300}

@@ -141,7 +141,7 @@ def test_a_population_in_parts_gives_the_same_bits(problem, monkeypatch):
         seen.append(len(candidates))
         return runs(ready, candidates, *shares)
 
-    monkeypatch.setattr("armid.problem.problem.MOST_VALUES", 1000)
+    monkeypatch.setattr("armid.problem.problem.MOST_AT_ONCE", 1000)
     monkeypatch.setattr(ReadyRecord, "runs", watched)
     np.testing.assert_array_equal(problem.value(X), whole)
     assert seen == [16, 16, 5]

@@ -10,7 +10,7 @@ from pymoo.core.problem import Problem
 
 import armid
 from armid.errors import ArmidError
-from armid.problem.suite import CLASSES, DEFINITIONS, line_across, n_minima
+from armid.problem.suite import CLASSES_OF_FORMS, DEFINITIONS, line_across, n_minima
 
 # Values of version 1 at a point each: u_j = frac(i sqrt(j + 2)), i from 1 in this order.
 STORED = {
@@ -117,7 +117,7 @@ def test_what_is_hard_is_measured():
     assert arm.landscape["minima"] == 1.0
     assert shape.difficulty == "stair"
     assert shape.landscape["stair"] > 0.9
-    assert {measure for _, measure, _ in CLASSES} < set(arm.landscape)
+    assert {measure for _, measure, _ in CLASSES_OF_FORMS} < set(arm.landscape)
 
 
 def test_a_campaign_is_a_problem_on_top(paper_arm, paper_arm_folder):

@@ -33,7 +33,7 @@ def runs(store):
 
 
 def test_what_is_missing_comes_in_order_and_once(store, monkeypatch):
-    monkeypatch.setattr("armid.study.store.PAGE", 3)
+    monkeypatch.setattr("armid.study.store.PAGE_OF_ROWS", 3)
     missing = store.missing()
     assert next(missing).run == "a0"
     assert store.save(Outcome("a0", DONE))

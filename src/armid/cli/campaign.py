@@ -68,7 +68,7 @@ def simulate_command(
     give(parameters=simulated.parameters, folder=out, files=files)
 
 
-DEFAULT = (
+DEFAULT_IDENTIFIER = (
     "pso+least_squares: no other of 20 identifiers ends nearer to the truth in results/benchmark, and its swarm looks "
     "at the whole box; cmaes for a fitness that is not a sum of squares"
 )
@@ -82,7 +82,7 @@ DEFAULT = (
 ))  # fmt: skip
 @problem_options
 @click.option(
-    "--identifier", show_default=DEFAULT, shell_complete=completes("identifiers"),
+    "--identifier", show_default=DEFAULT_IDENTIFIER, shell_complete=completes("identifiers"),
     help="Who searches: see `armid list identifiers`; multistart:LOCAL; or a chain such as pso+bobyqa.",
 )  # fmt: skip
 @click.option(
@@ -123,12 +123,12 @@ def identify_command(
     interval not to rely on is struck through), warnings in words, and errors. Without --out nothing is written. Ctrl-C
     ends the search, judges the best so far, and exits with 130.
     """
-    from armid.api import FITNESS, PAPER_FITNESS
+    from armid.api import PAPER_FITNESS, USUAL_FITNESS
     from armid.api import identify as run
-    from armid.estimation.identify import INTERRUPTED
+    from armid.estimation.identify import WAS_INTERRUPTED
     from armid.problem.fitness import SIMILARITIES
 
-    minimised = fitness or (PAPER_FITNESS if paper else FITNESS)
+    minimised = fitness or (PAPER_FITNESS if paper else USUAL_FITNESS)
     goal = 1.0 - target if target is not None and minimised.partition(":")[0] in SIMILARITIES else target
     named = {name: value_of(value) for name, value in assignments(options, "--option").items()}
     refuse_unwritable(out, IDENTIFICATION.file)
@@ -136,7 +136,7 @@ def identify_command(
                          speaks(), options=named, paper=paper, interval=not no_interval,
                          **given(**problem))  # fmt: skip
     show_and_save(identification, out)
-    if identification.stopped == INTERRUPTED:
+    if identification.stopped == WAS_INTERRUPTED:
         sys.exit(130)
 
 
@@ -173,12 +173,12 @@ def identifiability_command(
     not looked at.
     """
     from armid.api import examine
-    from armid.estimation.examine import LEAST_NOISE, RANKINGS
+    from armid.estimation.examine import LEAST_EXAMINED, RANKINGS
 
     if rank not in RANKINGS:
         raise ArmidError(f"--rank '{rank}': {nearest(rank, RANKINGS)}")
-    if noise is not None and not LEAST_NOISE <= noise <= 1.0 / LEAST_NOISE:
-        expected = f"a finite number above 0 is expected, {LEAST_NOISE:g} to {1.0 / LEAST_NOISE:g}"
+    if noise is not None and not LEAST_EXAMINED <= noise <= 1.0 / LEAST_EXAMINED:
+        expected = f"a finite number above 0 is expected, {LEAST_EXAMINED:g} to {1.0 / LEAST_EXAMINED:g}"
         raise ArmidError(f"--noise is {noise:g}, {expected}")
     if at and source is not None:
         raise ArmidError("--at and --from are both given: one point is expected")

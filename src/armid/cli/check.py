@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from armid.contract.trials import ContractPoint
 
 # Time after which an alarm that was not heard is given once more [s].
-AGAIN_S = 1.0
+ALARM_AGAIN_S = 1.0
 
 
 @command("check", epilog=examples(
@@ -100,7 +100,7 @@ def alarm(seconds: float) -> Iterator[None]:
 
     before = signal.signal(signal.SIGALRM, over)
     # again and again: what is raised while the compiler calls back is lost
-    signal.setitimer(signal.ITIMER_REAL, seconds, AGAIN_S)
+    signal.setitimer(signal.ITIMER_REAL, seconds, ALARM_AGAIN_S)
     try:
         yield
     finally:
@@ -139,9 +139,9 @@ def bench_command(quick: bool, plugins: tuple[str, ...]) -> None:
 # DOP853 has it from the plain equations (armid.contract.trials.simulate_plainly). The engine has to come this near.
 CANDIDATE = (3.2e6, 1.0, 0.62, 1.0)
 TRAJECTORY = (0.0, 0.54620029, 1.03742497, 1.48415008, 1.90696082, 2.3045749, 2.13752181, 1.15457684)
-N_SAMPLES, INTERVAL, TOLERANCE = 701, 1e-3, 2e-5
+BENCH_SAMPLES, BENCH_INTERVAL, BENCH_TOLERANCE = 701, 1e-3, 2e-5
 # Half widths of the 95 % interval within which the truth of the synthetic axis has to be found.
-NEAR = 2.0
+HALF_WIDTHS = 2.0
 
 
 @command("doctor", short_help="Say whether armid works here.", epilog=examples("armid doctor"))
@@ -193,7 +193,9 @@ def compiler() -> tuple[bool, str]:
 
 def simulation() -> tuple[bool, str]:
     error = abs(simulated(1)[0, ::100] - TRAJECTORY).max()
-    return bool(error <= TOLERANCE), f"within {error:.1g} rad/s of the stored trajectory, {TOLERANCE:g} is allowed"
+    return bool(
+        error <= BENCH_TOLERANCE
+    ), f"within {error:.1g} rad/s of the stored trajectory, {BENCH_TOLERANCE:g} is allowed"
 
 
 def threads() -> tuple[bool, str]:
@@ -211,7 +213,7 @@ def simulated(n_threads: int) -> Any:
 
     arm = PLANTS["shell_transfer_arm"]
     constants = {"theta_C": np.radians(-48.0), "theta_D": np.radians(22.0), "shell": 1.0, "U": 28.0}
-    manoeuvre, model = Manoeuvre(INTERVAL, N_SAMPLES, constants), Model(arm)
+    manoeuvre, model = Manoeuvre(BENCH_INTERVAL, BENCH_SAMPLES, constants), Model(arm)
     population = np.tile(CANDIDATE, (64, 1))
     schedule = calibrate(model, manoeuvre, population[:1]).schedule
     return simulate(model, manoeuvre, population, schedule, threads=n_threads).output
@@ -228,7 +230,7 @@ def identification() -> tuple[bool, str]:
         inertia = identify(folder, effects=["viscous"], identifier="least_squares").to_dict()["parameters"]["inertia"]
     off = abs(inertia["value"] - INERTIA) / (inertia["high"] - inertia["value"])
     near = f"{off:.1f} half widths of its interval"
-    return off <= NEAR, f"inertia {inertia['value']:.5g} kg m2 (true: {INERTIA:g}), {near}"
+    return off <= HALF_WIDTHS, f"inertia {inertia['value']:.5g} kg m2 (true: {INERTIA:g}), {near}"
 
 
 POINTS = {"versions": versions, "cache": cache, "compiler": compiler, "simulation": simulation, "threads": threads,

@@ -58,10 +58,10 @@ def list_command(what: str, names: tuple[str, ...], is_long: bool, plugins: tupl
     elif wants("json"):
         give(**{what: {name: entry(thing) for name, thing in things.items()}})
     elif names or is_long:
-        text = partial(DETAILS[what], registry=registry, is_long=is_long)
+        text = partial(DETAILS_OF[what], registry=registry, is_long=is_long)
         say(*"\n\n".join(text(name, thing) for name, thing in things.items()).splitlines())
     else:
-        columns, row = SHORT[what]
+        columns, row = SHORT_TABLES[what]
         hint = f"; `armid list {what} NAME` says more"
         rows = [(name, *row(thing)) for name, thing in things.items()]
         main = table(what, columns, rows)
@@ -207,14 +207,14 @@ def sibling_text(plant: Plant, is_long: bool) -> str:
 
 
 # Columns of the table of each catalogue, and the cells of one name after the name itself.
-SHORT: dict[str, tuple[tuple[str, ...], Callable[[Any], Sequence[str]]]] = {
+SHORT_TABLES: dict[str, tuple[tuple[str, ...], Callable[[Any], Sequence[str]]]] = {
     "plants": (("plant", "recorded in", "what it is"), lambda p: (recorded_by(p), note_of(p))),
     "effects": (("effect", "at", "what it is"), lambda e: (", ".join(e.adds), forms_of(e))),
     "fitness": (("fitness", "records join by", "what it is"), lambda f: (f.join, note_of(f))),
     "analyses": (("analysis", "what it is"), lambda a: (note_of(a),)),
     "identifiers": (("identifier", "what it is", "kind"), lambda i: (note_of(i), kinds_of(i))),
 }
-DETAILS: dict[str, Callable[..., str]] = {
+DETAILS_OF: dict[str, Callable[..., str]] = {
     "plants": plant_text, "effects": effect_text, "fitness": plain_text, "analyses": plain_text,
     "identifiers": identifier_text,
 }  # fmt: skip

@@ -11,8 +11,8 @@ from typing import Any
 import click
 
 from armid.cli.options import STUDIES, Heard, tell, while_read
-from armid.cli.start import INTERRUPTED, end_on_request
-from armid.errors import ArmidError, on_a_line
+from armid.cli.start import end_on_request
+from armid.errors import INTERRUPTED, ArmidError, on_a_line
 from armid.progress import LOG
 
 BAD_INPUT = 2

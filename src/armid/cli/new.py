@@ -19,7 +19,7 @@ import numpy as np
 from armid.cli.options import command, completes, examples, give, plugin_option, say
 from armid.errors import ArmidError, nearest, quoted
 from armid.model import Array
-from armid.model.effect import RESERVED
+from armid.model.effect import RESERVED_WORDS
 from armid.model.parameter import check_name
 from armid.record.sensor import FEWEST_REST_SAMPLES, sensor_of, stands_still
 from armid.record.signal import wraps_at
@@ -32,18 +32,18 @@ CATALOGUES = {"effect": "effects", "fitness": "fitness", "identifier": "identifi
               "analysis": "analyses"}  # fmt: skip
 # Kind and --style -> the template that replaces the kind's own.
 STYLES = {("identifier", "function"): "identifier_function"}
-CAMPAIGN, STUDY = "campaign", "study"
-KINDS = (*CATALOGUES, CAMPAIGN, STUDY)
+CAMPAIGN, NEW_STUDY = "campaign", "study"
+NEW_KINDS = (*CATALOGUES, CAMPAIGN, NEW_STUDY)
 # What the kinds that are no Python file become, and the command that tries them.
-FILES = {CAMPAIGN: ("{}", "armid check {}"), STUDY: ("{}.toml", "armid study {}")}
+FILES = {CAMPAIGN: ("{}", "armid check {}"), NEW_STUDY: ("{}.toml", "armid study {}")}
 TRYING = {"analysis": "armid report out/STUDY --plugin {}"}
 FOLDER_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
 # The made-up axis: inertia [kg m2], viscous friction [N m s/rad], noise of the speed [rad/s].
-INERTIA, FRICTION, NOISE = 0.05, 0.03, 0.01
-INTERVAL, N_SAMPLES = 0.005, 401
+INERTIA, FRICTION_OF_SHAFT, NOISE_OF_RECORDS = 0.05, 0.03, 0.01
+RECORD_INTERVAL, RECORD_SAMPLES = 0.005, 401
 # File -> size [N m] and frequency [Hz] of the drive, seed of the noise.
 RECORDS = {"synthetic_train.csv": (1.0, 0.8, 1), "synthetic_holdout.csv": (0.7, 1.3, 2)}
-FIRST_STEP = 0.1
+DRIVEN_FROM_S = 0.1
 DIGITS = 6
 
 
@@ -51,7 +51,7 @@ DIGITS = 6
     "armid new effect my_drag", "armid check my_drag.py:my_drag", "armid new campaign my_axis --out studies/campaigns",
     "armid new campaign my_motor --from first.csv second.csv",
 ))  # fmt: skip
-@click.argument("kind", metavar="|".join(KINDS), shell_complete=completes(words=KINDS))
+@click.argument("kind", metavar="|".join(NEW_KINDS), shell_complete=completes(words=NEW_KINDS))
 @click.argument("name", metavar="NAME")
 @click.option(
     "--style", default="", metavar="function",
@@ -77,8 +77,8 @@ def new_command(kind: str, name: str, style: str, files: tuple[Path, ...], out: 
     """
     from armid.record import write_campaign
 
-    if kind not in KINDS:
-        raise ArmidError(f"kind '{kind}' is not known: {nearest(kind, KINDS)}")
+    if kind not in NEW_KINDS:
+        raise ArmidError(f"kind '{kind}' is not known: {nearest(kind, NEW_KINDS)}")
     if style and (kind, style) not in STYLES:
         raise ArmidError(f"--style '{style}' of kind '{kind}': an identifier has the style 'function'")
     if (files or more) and kind != CAMPAIGN:
@@ -105,7 +105,7 @@ def new_command(kind: str, name: str, style: str, files: tuple[Path, ...], out: 
         write_campaign(target, text, tables)
     else:
         with NewFiles(out) as new_files:
-            text = filled("study.toml.txt", name=name) if kind == STUDY else python_file(template, name)
+            text = filled("study.toml.txt", name=name) if kind == NEW_STUDY else python_file(template, name)
             new_files.path(target.name).write_text(text, encoding="utf-8")
     check = trying.format(target)
     say(f"wrote {target}; try: {check}")
@@ -115,7 +115,7 @@ def new_command(kind: str, name: str, style: str, files: tuple[Path, ...], out: 
 @command("schema", short_help="Print the JSON Schema of a campaign or a study.", epilog=examples(
     "armid schema study > study.schema.json", "armid schema campaign --plugin mine.py:my_plant",
 ))  # fmt: skip
-@click.argument("what", metavar="campaign|study", shell_complete=completes(words=(CAMPAIGN, STUDY)))
+@click.argument("what", metavar="campaign|study", shell_complete=completes(words=(CAMPAIGN, NEW_STUDY)))
 @plugin_option
 def schema_command(what: str, plugins: tuple[str, ...]) -> None:
     """Print the JSON Schema of campaign.toml or of a study's file.
@@ -127,8 +127,8 @@ def schema_command(what: str, plugins: tuple[str, ...]) -> None:
     from armid.record.schema import CampaignSheet, json_schema, key_schema, sheet_schema
     from armid.study.spec import study_schema
 
-    if what not in (CAMPAIGN, STUDY):
-        raise ArmidError(f"schema '{what}' is not known: {nearest(what, (CAMPAIGN, STUDY))}")
+    if what not in (CAMPAIGN, NEW_STUDY):
+        raise ArmidError(f"schema '{what}' is not known: {nearest(what, (CAMPAIGN, NEW_STUDY))}")
     registry = load_registry(plugins)
     registered = {kind: getattr(registry, kind) for kind in ("plants", "effects", "identifiers")}
     keys = {key.key: key_schema(key) for plant in registry.plants.values() for key in plant.keys}
@@ -154,7 +154,7 @@ def check_new_name(kind: str, name: str, taken: Collection[str], template: str) 
             raise ArmidError(f"{kind} '{name}' is not a usable name: letters, digits, '_', '-' and '.' are expected")
         return
     check_name(name, kind)
-    if name in taken or (kind == "effect" and name in RESERVED):
+    if name in taken or (kind == "effect" and name in RESERVED_WORDS):
         raise ArmidError(f"{kind} '{name}' is there already: another name is expected")
     if name in names_in(python_file(template, "_")):
         raise ArmidError(f"{kind} '{name}' cannot have this name, which the file itself uses: another is expected")
@@ -177,7 +177,7 @@ def names_in(text: str) -> set[str]:
 
 
 def campaign_text(name: str) -> str:
-    return filled("campaign.toml.txt", name=name, inertia=INERTIA, friction=FRICTION, noise=NOISE)
+    return filled("campaign.toml.txt", name=name, inertia=INERTIA, friction=FRICTION_OF_SHAFT, noise=NOISE_OF_RECORDS)
 
 
 def synthetic_records() -> dict[str, dict[str, Array]]:
@@ -189,19 +189,21 @@ def record(size: float, frequency: float, seed: int) -> dict[str, Array]:
 
     J dv/dt = u - c v with u constant between samples is solved exactly: v' = v exp(-c dt/J) + u/c (1 - exp(-c dt/J)).
     """
-    times = INTERVAL * np.arange(N_SAMPLES)
-    drive = np.where(times < FIRST_STEP, 0.0, size * np.sign(np.cos(2.0 * np.pi * frequency * (times - FIRST_STEP))))
-    kept = np.exp(-FRICTION * INTERVAL / INERTIA)
-    speed = np.zeros(N_SAMPLES)
-    for i in range(N_SAMPLES - 1):
-        speed[i + 1] = kept * speed[i] + drive[i] / FRICTION * (1.0 - kept)
-    measured = speed + NOISE * np.random.default_rng(seed).standard_normal(N_SAMPLES)
+    times = RECORD_INTERVAL * np.arange(RECORD_SAMPLES)
+    drive = np.where(
+        times < DRIVEN_FROM_S, 0.0, size * np.sign(np.cos(2.0 * np.pi * frequency * (times - DRIVEN_FROM_S)))
+    )
+    kept = np.exp(-FRICTION_OF_SHAFT * RECORD_INTERVAL / INERTIA)
+    speed = np.zeros(RECORD_SAMPLES)
+    for i in range(RECORD_SAMPLES - 1):
+        speed[i + 1] = kept * speed[i] + drive[i] / FRICTION_OF_SHAFT * (1.0 - kept)
+    measured = speed + NOISE_OF_RECORDS * np.random.default_rng(seed).standard_normal(RECORD_SAMPLES)
     columns = {"time_s": times, "angular_velocity_rad_s": measured, "drive_N_m": drive}
     return {header: np.round(values, DIGITS) for header, values in columns.items()}
 
 
 # Words of a header, without its unit, that tell what a column is; the first that fits.
-WORDS = {
+WORDS_OF_HEADERS = {
     "time": ("time", "t", "timestamp", "clock", "tempo", "zeit", "temps"),
     "speed": ("angular_velocity", "velocity", "speed", "omega", "vel", "w", "rate", "gyro"),
     "position": ("angle", "position", "pos", "theta", "phi", "q"),
@@ -223,7 +225,7 @@ HEADERS = {
 DRIVEN_IN = {"mV": ("V", 1e-3), "kV": ("V", 1e3), "mA": ("A", 1e-3), "kN": ("N", 1e3), "mN m": ("N_m", 1e-3),
              "mNm": ("N_m", 1e-3), "kNm": ("N_m", 1e3), "kN m": ("N_m", 1e3)}  # fmt: skip
 LINEAR, DRIVES = {"m", "mm", "m_s", "mm_s", "N"}, {"V", "A", "N", "N_m"}
-TURNING = {*SUFFIXES["rad/s"], *SUFFIXES["rad"]}
+TURNING_ENDS = {*SUFFIXES["rad/s"], *SUFFIXES["rad"]}
 # A machine is at rest as long as its signal is nearer to its first rows than so many times their range.
 BEYOND_REST = 2.5
 # Share of equal neighbours from which on an input keeps its value between samples.
@@ -259,7 +261,7 @@ def column_of(header: str) -> Column:
 def quantity_of(column: Column) -> str:
     """Return what a column is: a key of WORDS, "" for nothing that is known."""
     parts = set(re.split(r"[^a-z]+", column.words))
-    for quantity, words in WORDS.items():
+    for quantity, words in WORDS_OF_HEADERS.items():
         if any(word == column.words or word in parts for word in words):
             return quantity
     if column.end in SUFFIXES["rad/s"]:
@@ -282,7 +284,7 @@ def guessed_campaign(name: str, files: Sequence[Path]) -> tuple[str, dict[str, d
     if linear and "speed" not in roles:
         raise ArmidError(f"{tables[0].where}: a position of a linear axis is there and no speed, which armid has no "
                          "plant for: a speed, or a plant of your own by `armid new plant`, is expected")  # fmt: skip
-    turns = [quoted(roles[q].header) for q in ("speed", "position") if q in roles and roles[q].end in TURNING]
+    turns = [quoted(roles[q].header) for q in ("speed", "position") if q in roles and roles[q].end in TURNING_ENDS]
     if linear and turns:
         straight = next(quoted(c.header) for c in roles.values() if c.end in LINEAR)
         raise ArmidError(f"{tables[0].where}: {straight} tells of a machine that moves straight and {turns[0]} of one "

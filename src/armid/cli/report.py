@@ -43,7 +43,7 @@ def made_by() -> dict[str, Any]:
     return {"command": shlex.join(["armid", *words]), "settings": settings}
 
 
-STUDY, PAGE = "study.sqlite", "report.html"
+STUDY_FILE, PAGE_FILE = "study.sqlite", "report.html"
 
 
 @command("report", short_help="Write the page of stored results.", epilog=examples(
@@ -93,7 +93,7 @@ def report_study(folder: Path, key: Path | None, width: str, plugins: tuple[str,
 
     results = load_study(folder)
     analyses, place = load_registry(plugins).analyses, results.path.parent
-    refuse_unwritable(place, PAGE)
+    refuse_unwritable(place, PAGE_FILE)
     try:
         document = report_of(results, key, analyses, made_by()["command"])
         if document.warning:
@@ -112,13 +112,13 @@ def report_study(folder: Path, key: Path | None, width: str, plugins: tuple[str,
     if width:
         say(f"wrote {len(files.names)} figures as PDF to {place}")
     else:
-        say(f"wrote report.md and {len(files.names) - 2} tables and figures to {place}, all on one page in {PAGE}")
+        say(f"wrote report.md and {len(files.names) - 2} tables and figures to {place}, all on one page in {PAGE_FILE}")
     give(answer=document.said, folder=place, files=files.names)
 
 
 def kind_in(folder: Path) -> Kind | None:
     """Return the kind of result that a folder holds, None for a study, whose store may be named itself."""
-    if folder.name == STUDY or (folder / STUDY).is_file():
+    if folder.name == STUDY_FILE or (folder / STUDY_FILE).is_file():
         return None
     kinds = [kind for kind in (LOOP, IDENTIFICATION) if (folder / kind.file).is_file()]
     if len(kinds) > 1:
@@ -128,7 +128,7 @@ def kind_in(folder: Path) -> Kind | None:
         return IDENTIFIABILITY
     if kinds:
         return kinds[0]
-    names = f"{STUDY} of `armid study`, {LOOP.file} of `{LOOP.command}` or {IDENTIFICATION.file}"
+    names = f"{STUDY_FILE} of `armid study`, {LOOP.file} of `{LOOP.command}` or {IDENTIFICATION.file}"
     raise ArmidError(f"{folder} holds no result: {names} of `{IDENTIFICATION.command}` is expected")
 
 

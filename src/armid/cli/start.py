@@ -6,8 +6,6 @@ import sys
 import threading
 from typing import Any
 
-INTERRUPTED = 130
-
 
 def open_closed_streams() -> None:
     """Let what is written to a stream that was closed before the start go nowhere.

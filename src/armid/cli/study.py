@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from armid.study.runner import Ending
 
 
-MOST_NAMED = 300
+MOST_LETTERS_NAMED = 300
 jobs_option = click.option(
     "--jobs", type=click.IntRange(1), help="Worker processes. [default: as many as processors]"
 )  # fmt: skip
@@ -87,7 +87,7 @@ def words(ending: "Ending") -> list[str]:
     if ending.interrupted:
         lines.append("interrupted: every finished run is kept, the same command goes on")
     if counts.failed:
-        lines.append(f"{counts.failed} runs failed, the first: {ending.first_error[:MOST_NAMED]}")
+        lines.append(f"{counts.failed} runs failed, the first: {ending.first_error[:MOST_LETTERS_NAMED]}")
     return lines
 
 

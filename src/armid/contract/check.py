@@ -23,7 +23,7 @@ from armid.problem.problem import ReadyRecord
 from armid.problem.space import space_of
 from armid.record import Campaign, Record
 
-INTERVAL, NOISE = 1e-3, 0.01
+CHECK_INTERVAL, NOISE_OF_TRIAL = 1e-3, 0.01
 
 
 def check_thing(kind: str, name: str, thing: Any, plants: Mapping[str, Plant] = PLANTS) -> Iterator[ContractPoint]:
@@ -110,7 +110,7 @@ def check_fitness(fitness: Fitness) -> list[ContractPoint]:
     except ArmidError as error:
         return [ContractPoint("one value per candidate", False, str(error))]
     given = trial_series()
-    fitness(*given, INTERVAL, NOISE)
+    fitness(*given, CHECK_INTERVAL, NOISE_OF_TRIAL)
     untouched = all(np.array_equal(a, b) for a, b in zip(given, trial_series(), strict=True))
     text = "the arrays are as they were" if untouched else "the arrays that it was given have changed"
     apart = np.array_equal(failed[:-1], values) and np.array_equal(alone, values[2:3])
@@ -131,14 +131,14 @@ def check_fitness(fitness: Fitness) -> list[ContractPoint]:
 
 
 def trial_series() -> tuple[Array, Array]:
-    times = INTERVAL * np.arange(300)
+    times = CHECK_INTERVAL * np.arange(300)
     measured = np.sin(12.0 * times) * np.exp(-2.0 * times)
     disturbances = np.array([0.0, 0.05, 0.2, 0.6])
     return measured, measured + disturbances[:, np.newaxis] * np.cos(23.0 * times)
 
 
 def value(fitness: Fitness, measured: Array, simulated: Array) -> Array:
-    return fitness(measured.copy(), simulated.copy(), INTERVAL, NOISE)
+    return fitness(measured.copy(), simulated.copy(), CHECK_INTERVAL, NOISE_OF_TRIAL)
 
 
 class Trial(Metered):
@@ -174,7 +174,7 @@ class Trial(Metered):
             out["F"][failed] = np.nan
 
 
-BUDGET = 403
+TRIAL_BUDGET = 403
 # Where the trial's simulations begin to raise: inside a generation.
 RAISES_AT = 50
 
@@ -188,7 +188,9 @@ def check_identifier(identifier: Identifier) -> Iterator[ContractPoint]:
         return
     log = meter.log()
     best = f"the best of the log is {np.min(log.F):.3g}, the best that is kept {meter.best_f:.3g}"
-    yield ContractPoint("exact budget", 0 < meter.used <= BUDGET, f"{meter.used} of {BUDGET} simulations used")
+    yield ContractPoint(
+        "exact budget", 0 < meter.used <= TRIAL_BUDGET, f"{meter.used} of {TRIAL_BUDGET} simulations used"
+    )
     yield ContractPoint("inside the box", problem.outside == 0, f"{problem.outside} candidates outside the bounds")
     yield ContractPoint("best never lost", meter.best_f == float(np.min(log.F)), best)
     early = float(np.median(log.F[:20]))
@@ -211,7 +213,7 @@ def failing(identifier: Identifier, undisturbed: Meter, name: str, bare: bool) -
 
     One that ends before a third of the undisturbed run has been stopped by a failure.
     """
-    meter, problem = run(identifier, 1, Trial(Meter(BUDGET), holes=True, bare=bare))
+    meter, problem = run(identifier, 1, Trial(Meter(TRIAL_BUDGET), holes=True, bare=bare))
     log = meter.log()
     first = log.F[~log.failed][:20]
     improves = first.size > 0 and meter.best_f < float(np.median(first))
@@ -236,7 +238,7 @@ def raising(identifier: Identifier) -> ContractPoint:
 
     came = "nothing"
     try:
-        run(identifier, 1, Trial(Meter(BUDGET), watch=watch))
+        run(identifier, 1, Trial(Meter(TRIAL_BUDGET), watch=watch))
     except Exception as error:
         came = type(error).__name__
     ended_before = came == "nothing" and seen <= RAISES_AT
@@ -247,10 +249,10 @@ def raising(identifier: Identifier) -> ContractPoint:
 
 def run(identifier: Identifier, seed: int, problem: Trial | None = None, noise: int = 1) -> tuple[Meter, Trial]:
     """Run an identifier on a trial problem; noise: state of the global generators, which must not matter."""
-    trial = Trial(Meter(BUDGET)) if problem is None else problem
+    trial = Trial(Meter(TRIAL_BUDGET)) if problem is None else problem
     assert trial.meter is not None
     with disturbed(noise):
-        minimize(trial, identifier.build(BUDGET), MeterTermination(trial.meter), seed=seed, copy_algorithm=False)
+        minimize(trial, identifier.build(TRIAL_BUDGET), MeterTermination(trial.meter), seed=seed, copy_algorithm=False)
     return trial.meter, trial
 
 

@@ -14,7 +14,7 @@ from armid.errors import ArmidError
 from armid.model import Array, Effect, Input, Manoeuvre, Model, Parameter, Plant
 from armid.model.graph import LATE_LEAVES, Node
 
-N_SAMPLES, INTERVAL = 401, 2e-3
+TRIAL_SAMPLES, TRIAL_INTERVAL = 401, 2e-3
 # The moment of gravity that a hanging axis gets, as a share of the effort scale.
 GRAVITY = 0.4
 
@@ -109,7 +109,7 @@ def from_null(model: Model, effect: Effect, shares: Array) -> Array:
 
 def trial_manoeuvres(plant: Plant) -> list[Manoeuvre]:
     """Return two manoeuvres of a plant: there and back; inputs are a sine and a sawtooth over their typical range."""
-    times = INTERVAL * np.arange(N_SAMPLES)
+    times = TRIAL_INTERVAL * np.arange(TRIAL_SAMPLES)
     shapes = (np.sin(9.0 * times), 2.0 * ((1.3 * times) % 1.0) - 1.0)
     gain = next((c.value for c in plant.constants if c.name == "gain"), 1.0)
     size = 0.5 * plant.scales.effort / (gain or 1.0)
@@ -121,7 +121,9 @@ def trial_manoeuvres(plant: Plant) -> list[Manoeuvre]:
         return 0.5 * (low + high) + 0.5 * (high - low) * shape
 
     return [
-        Manoeuvre(INTERVAL, N_SAMPLES, constants_of(plant, turned), {i.name: moved(i, shape) for i in plant.inputs})
+        Manoeuvre(
+            TRIAL_INTERVAL, TRIAL_SAMPLES, constants_of(plant, turned), {i.name: moved(i, shape) for i in plant.inputs}
+        )
         for turned, shape in enumerate(shapes)
     ]
 
@@ -146,9 +148,9 @@ def constants_of(plant: Plant, turned: int) -> dict[str, float]:
 # It shares nothing with the engine but the graph of equations, so that it can judge the engine.
 
 Latches = tuple[float, ...]
-TOLERANCE = 1e-10
+TRIAL_TOLERANCE = 1e-10
 # Longest step in sample intervals, so that no guard changes its sign twice in one.
-LONGEST_STEP = 4.0
+LONGEST_OF_ORACLE = 4.0
 # Evaluations of the equations; a usual motion takes some 10,000.
 MOST_RATES = 100_000
 
@@ -286,8 +288,9 @@ class PlainModel:
         """Return scipy's solution at some times, which ends where a guard changes its sign."""
         keys = [f"guard__{k}" for k, c in zip(self.latches, closed, strict=True) if not c] + self.kinks
         return solve_ivp(
-            lambda t, y: self.rates(t, y, closed), (begin, times[-1]), states, method="DOP853", rtol=TOLERANCE,
-            atol=TOLERANCE, t_eval=times, dense_output=bool(self.late), max_step=LONGEST_STEP * self.manoeuvre.interval,
+            lambda t, y: self.rates(t, y, closed), (begin, times[-1]), states, method="DOP853", rtol=TRIAL_TOLERANCE,
+            atol=TRIAL_TOLERANCE, t_eval=times, dense_output=bool(self.late),
+            max_step=LONGEST_OF_ORACLE * self.manoeuvre.interval,
             events=[self.event(key, begin, closed) for key in keys] or None,
         )  # fmt: skip
 

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.engine.generate import LONGEST
+from armid.engine.generate import LONGEST_SPAN
 from armid.engine.simulate import Schedule, Simulation, simulate
 from armid.errors import ArmidError
 from armid.model import Array, Manoeuvre, Model, Plant
@@ -20,14 +20,14 @@ ALLOWED = {STANDARD: 5e-6, FINE: 1e-7}
 # hundredth of it, which no derivative sees), and between their ends (shares of the allowed error).
 LASTING, PASSING = 1.5e-8, 0.1
 SUBSTEPS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
-MARGIN = 0.5
+MARGIN_OF_STEPS = 0.5
 # Below this many times the engine's standard error the noise no longer hides that error.
 NOISE_HIDES = 10.0
 # How many candidates must not have switched yet for a long step to count as tried.
 N_UNSWITCHED = 8
 N_PROBES = 48
 # Values of a simulation of all candidates that are in memory at a time (64 MB); more are tried in parts of so many.
-MOST_VALUES, PART = 2**23, 8
+MOST_OF_PROBES, PART = 2**23, 8
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ def calibrate(
     """
     if accuracy not in ALLOWED:
         raise ArmidError(f"accuracy '{accuracy}' is unknown: {' or '.join(ALLOWED)} is expected")
-    if len(candidates) > PART and len(candidates) * manoeuvre.n_samples > MOST_VALUES:
+    if len(candidates) > PART and len(candidates) * manoeuvre.n_samples > MOST_OF_PROBES:
         return in_parts(model, manoeuvre, candidates, accuracy)
     allowed = ALLOWED[accuracy] * model.plant.sizes[0]
     runs: dict[int, Simulation] = {}
@@ -123,7 +123,7 @@ def calibrate(
         if run(n).failed.any():
             failed, finest = run(n).failed, run(SUBSTEPS[-1]).failed
             error = np.inf if (failed & ~finest).any() or finest.all() else error
-        if error <= MARGIN * allowed:
+        if error <= MARGIN_OF_STEPS * allowed:
             break
         if n != SUBSTEPS[-1]:
             del runs[n]
@@ -158,7 +158,7 @@ def long_steps(
     model: Model, manoeuvre: Manoeuvre, candidates: Array, schedule: Schedule, run: Simulation, allowed: float
 ) -> NDArray[np.int64] | None:
     """Return from which sample on a step may span 2, 4 and 8 samples before the switch; None where none may."""
-    if not model.latches or model.plant.inputs or manoeuvre.n_samples < 2 * LONGEST:
+    if not model.latches or model.plant.inputs or manoeuvre.n_samples < 2 * LONGEST_SPAN:
         return None
     if model.delays:
         # a candidate with a dead time takes every sample, whatever the plan says

@@ -210,7 +210,7 @@ KERNELS: WeakKeyDictionary[Model, tuple[Kernel, int]] = WeakKeyDictionary()
 LOCK = RLock()
 # Kernels, by `id`, that are being compiled.
 COMPILING: set[int] = set()
-MOST_NAMED = 3
+MOST_COMPILED = 3
 
 
 def compile_model(model: Model) -> tuple[Kernel, int]:
@@ -233,8 +233,8 @@ def compiling(model: Model, kernel: Kernel) -> Iterator[None]:
         yield
         return
     COMPILING.add(id(kernel))
-    name = " + ".join([model.plant.name, *(e.name for e in model.effects[:MOST_NAMED])])
-    more = f" and {len(model.effects) - MOST_NAMED} effects more" if len(model.effects) > MOST_NAMED else ""
+    name = " + ".join([model.plant.name, *(e.name for e in model.effects[:MOST_COMPILED])])
+    more = f" and {len(model.effects) - MOST_COMPILED} effects more" if len(model.effects) > MOST_COMPILED else ""
     kept = "; it is kept for the next time" if kept_in() else ""
     collecting = gc.isenabled()
     gc.disable()

@@ -26,9 +26,9 @@ from armid.model.graph import LATE_LEAVES, Node
 # intervals that one step may span.
 BLOCK = 256
 MAX_CUTS = 8
-LONGEST = 8
+LONGEST_SPAN = 8
 # Below so many effects a model is what a user asked for, every effect in use; the choice would only cost.
-FEWEST = 8
+FEWEST_IDLE = 8
 # What a node of an effect is where the effect is not used; a guard never crosses 0.
 IDLE = {"term": 0.0, "late": 0.0, "rate": 0.0, "guard": 1.0}
 TEMPLATE = Path(__file__).parent / "templates" / "kernel.py.jinja"
@@ -125,7 +125,7 @@ class KernelParts:
             "delays_of_states": {one.delay for one in self.late_states},
         }  # fmt: skip
         return environment.get_template(TEMPLATE.name).render(
-            names | lists, guards=guards, carried=carried, block=BLOCK, max_cuts=MAX_CUTS, longest=LONGEST,
+            names | lists, guards=guards, carried=carried, block=BLOCK, max_cuts=MAX_CUTS, longest=LONGEST_SPAN,
             switches=list(zip(self.latches, self.latch_guards, strict=True)),
         )  # fmt: skip
 
@@ -156,7 +156,7 @@ def variable(key: str) -> str:
 
 def strengths_of(model: Model) -> dict[str, dict[str, float]]:
     """Return effect -> {key of a strength: its null} of the effects that may be inactive, none in a small model."""
-    if len(model.effects) < FEWEST:
+    if len(model.effects) < FEWEST_IDLE:
         return {}
     nulls = {e.name: {f"{e.name}__{p.name}": p.null for p in e.parameters if p.null is not None} for e in model.effects}
     return {name: strengths for name, strengths in nulls.items() if strengths}

@@ -87,7 +87,7 @@ RARE = LINKED | {"pipeline_class": LinkedApart, "forceinline": False}
 DOUBLE = ir.DoubleType()
 INT32 = ir.IntType(32)
 INT64 = ir.IntType(64)
-NUMBERS = (types.Float, types.Integer, types.Boolean)
+NUMBER_TYPES = (types.Float, types.Integer, types.Boolean)
 # No `nnan` or `ninf`: a diverging candidate must stay visible as NaN or infinity. No `reassoc`: the order in which an
 # equation is written is the order in which it is computed.
 FLAGS = ("contract", "nsz", "arcp")
@@ -114,7 +114,7 @@ class LanesModel(models.PrimitiveModel):  # type: ignore[misc]
 
 
 def is_number(numba_type: Any) -> bool:
-    return isinstance(numba_type, NUMBERS)
+    return isinstance(numba_type, NUMBER_TYPES)
 
 
 def mixes_lanes(*numba_types: Any) -> bool:
@@ -266,7 +266,7 @@ def define_operator(python_operator: Any, compute: Callable[..., Any]) -> None:
         width = signature.return_type.width
         return compute(builder, *(to_lanes(context, builder, v, t, width) for v, t in values))
 
-    for pair in ((Lanes, Lanes), *((Lanes, n) for n in NUMBERS), *((n, Lanes) for n in NUMBERS)):
+    for pair in ((Lanes, Lanes), *((Lanes, n) for n in NUMBER_TYPES), *((n, Lanes) for n in NUMBER_TYPES)):
         lower_builtin(python_operator, *pair)(operate)
 
 

@@ -38,9 +38,9 @@ from armid.engine.simd import (
 compiled, rare = numba.njit(**LINKED), numba.njit(**RARE)
 
 LN2_HIGH, LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
-SMALLEST, LARGEST = 2.2250738585072014e-308, 1.7976931348623157e308
+SMALLEST_FLOAT, LARGEST_FLOAT = 2.2250738585072014e-308, 1.7976931348623157e308
 # Angles beyond are reduced one by one.
-FAR = 1e5
+FAR_ANGLE = 1e5
 # pi in three parts: subtracting k PI_A from x is exact, and PI_B and PI_C are what PI_A lacks.
 PI_A, PI_B, PI_C = 3.141592653589793, 1.2246467991473532e-16, -2.9947698097183397e-33
 
@@ -74,7 +74,7 @@ def lanes_log(x):
     p = ((p * s + 0.2857142857142857) * s + 0.4) * s + 0.6666666666666666
     result = fused(e, LN2_HIGH, fused(f, 2.0, fused(f * s, p, e * LN2_LOW)))
     below = select(-x, 0.0, np.nan, select(x, -1.0, -np.inf, x))
-    return select(x, LARGEST, x, select(x, SMALLEST, result, below))
+    return select(x, LARGEST_FLOAT, x, select(x, SMALLEST_FLOAT, result, below))
 
 
 @compiled
@@ -100,7 +100,7 @@ def far_by_lane(function: Callable[[float], float]) -> Any:
     @rare
     def put(x, result):
         for i in range(n_lanes(x)):
-            if abs(lane(x, i)) > FAR:
+            if abs(lane(x, i)) > FAR_ANGLE:
                 result = with_lane(result, i, function(lane(x, i)))
         return result
 
@@ -116,7 +116,7 @@ def lanes_sin(x):
     k = nearest(x * 0.3183098861837907)
     r = fused(k, -PI_C, fused(k, -PI_B, fused(k, -PI_A, x)))
     result = alternate(k) * sine_of_reduced(r)
-    return with_far_sines(x, result) if any_above(fabs(x), FAR) else result
+    return with_far_sines(x, result) if any_above(fabs(x), FAR_ANGLE) else result
 
 
 @compiled
@@ -126,7 +126,7 @@ def lanes_cos(x):
     half = k + 0.5
     r = fused(half, -PI_C, fused(half, -PI_B, fused(half, -PI_A, x)))
     result = -alternate(k) * sine_of_reduced(r)
-    return with_far_cosines(x, result) if any_above(fabs(x), FAR) else result
+    return with_far_cosines(x, result) if any_above(fabs(x), FAR_ANGLE) else result
 
 
 @compiled
@@ -167,14 +167,14 @@ def lanes_power(base, exponent):
     """Return a**b: exp(b log a) where a > 0 and that is a number, the scalar function in the other lanes."""
     a, b = select(1.0, 0.0, base, exponent), select(1.0, 0.0, exponent, base)
     result = lanes_exp(b * lanes_log(a))
-    is_rare = any_above(select(a, SMALLEST, result != result, 1.0), 0.5)
+    is_rare = any_above(select(a, SMALLEST_FLOAT, result != result, 1.0), 0.5)
     return power_by_lane(a, b, result) if is_rare else result
 
 
 @rare
 def power_by_lane(a, b, result):
     for i in range(n_lanes(result)):
-        if not (lane(a, i) > SMALLEST and lane(result, i) == lane(result, i)):
+        if not (lane(a, i) > SMALLEST_FLOAT and lane(result, i) == lane(result, i)):
             result = with_lane(result, i, math.pow(lane(a, i), lane(b, i)))
     return result
 

@@ -16,7 +16,7 @@ from armid.model import Array, Manoeuvre, Model
 from armid.model.graph import LATE_LEAVES, Node
 
 # Parts of a population per thread: candidates that switch early take longer, so that halves would be uneven.
-SHARES = 4
+SHARES_OF_THREADS = 4
 # A candidate one of whose signals exceeds so many times its size has diverged.
 DIVERGED = 1e3
 
@@ -234,7 +234,7 @@ def run(kernel: Kernel, given: tuple[Any, ...], results: tuple[Array, ...], n_gr
         if threads < 2 or n_groups < 2:
             kernel(*given, 0, n_groups, *results)
             return
-        edges = np.linspace(0, n_groups, min(SHARES * threads, n_groups) + 1).astype(int)
+        edges = np.linspace(0, n_groups, min(SHARES_OF_THREADS * threads, n_groups) + 1).astype(int)
         pool = pool_of(threads)
         parts = [pool.submit(kernel, *given, int(a), int(b), *results) for a, b in pairwise(edges)]
         for part in parts:

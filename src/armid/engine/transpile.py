@@ -16,18 +16,18 @@ from armid.model.graph import definition_of
 
 # A name that no function can have; it becomes `np` when the names of the function are replaced.
 NUMPY = "numpy itself"
-NUMBERS = (bool, int, float, np.floating, np.integer)
+NUMBER_CLASSES = (bool, int, float, np.floating, np.integer)
 CONTROL_FLOW = (ast.If, ast.While, ast.For, ast.Try, ast.With, ast.Match)
 LANE_OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.BitAnd, ast.BitOr)
 # What these return, or take, is one plain number: a function that uses them is computed lane by lane.
 SCALAR_BUILTINS = {"float", "int", "bool", "range", "len", "round"}
 ALLOWED_BUILTINS = {"abs", "min", "max", "pow", *SCALAR_BUILTINS}
 # Names of the generated module itself: an argument or a variable of that name gets another one.
-RESERVED = {"np", "math", "lane", "with_lane", "splat", "WIDTH", "result", "i"}
+RESERVED_IN_KERNEL = {"np", "math", "lane", "with_lane", "splat", "WIDTH", "result", "i"}
 
 
 def local_name(name: str) -> str:
-    return f"{name}__own" if name in RESERVED else name
+    return f"{name}__own" if name in RESERVED_IN_KERNEL else name
 
 
 @dataclass
@@ -69,7 +69,7 @@ def with_values(definition: ast.FunctionDef, function: FunctionType) -> ast.Func
     """Replace defaults by values, and make every argument one that can be named."""
     values = function.__defaults__ or ()
     for value in values:
-        if not isinstance(value, NUMBERS):
+        if not isinstance(value, NUMBER_CLASSES):
             raise ArmidError(f"the equation {function.__qualname__} has the default {value!r}: a number is expected")
     arguments = definition.args
     arguments.args = [*arguments.posonlyargs, *arguments.args]
@@ -210,7 +210,7 @@ class Names(ast.NodeTransformer):
     def replacement(self, name: str, value: Any) -> ast.AST:
         if isinstance(value, ModuleType) and value in (np, math):
             return ast.Name("np" if value is np else "math", ast.Load())
-        if isinstance(value, NUMBERS):
+        if isinstance(value, NUMBER_CLASSES):
             return number(value)
         called = getattr(value, "__name__", "")
         for module, name_of_module in ((np, "np"), (math, "math")):

@@ -25,15 +25,15 @@ Whitening = Callable[[Array], Array]
 Pair = tuple[int, int]
 Powers = Mapping[Pair, tuple[float, float]]
 # Difference of the criterion from which on the loop takes one model for better than another.
-THRESHOLD = 6.0
+BETTER_BY = 6.0
 # Draws of what the parameters may be: in the linear prediction, and of each rival whose record is simulated.
 N_DRAWS, N_REFIT_DRAWS = 512, 4
 # So many fits all simulations may take, each of so many samples; it decides how many manoeuvres are simulated, but not
 # below the fewest.
-MOST_FITS, OF_SAMPLES, FEWEST = 160, 6000, 2
+MOST_FITS, OF_SAMPLES, FEWEST_SIMULATED = 160, 6000, 2
 # Rivals that a manoeuvre tells apart no more often than this are not listed as separated by it.
 OFTEN = 0.5
-TOLERANCE = 1e-3
+REFIT_TOLERANCE = 1e-3
 # Draws of the noise of one record.
 N_NOISES = 64
 # Shares of a draw that are tried, and how many times the foretold rise of the sum of squares a share may bring.
@@ -134,7 +134,7 @@ def advise(
     possible = [f for f in grid if all(f in known for known in predictions)]
     powers = {f: predicted_powers(rivals, [p[f] for p in predictions], draws) for f in possible}
     fits = int(MOST_FITS * min(OF_SAMPLES / len(first.measured), 1.0))
-    most = max(fits // (len(rivals) ** 2 * N_REFIT_DRAWS), FEWEST)
+    most = max(fits // (len(rivals) ** 2 * N_REFIT_DRAWS), FEWEST_SIMULATED)
     promising = sorted(possible, key=lambda f: rank(mean_of(powers[f], 0), powers[f]), reverse=True)[:most]
     draws = normal_draws(max(len(r.z) for r in rivals), N_REFIT_DRAWS)
     outcomes = side_by_side(lambda f: simulated(rivals, f, white, draws), promising, threads)
@@ -239,7 +239,7 @@ def chance(right: Prediction, wrong: Prediction, old: float, draws: Array) -> tu
     normal = draws[:, : len(reduced)]
     missed = normal @ factor.T + d[:, 0]
     gained = np.sum(missed @ weight * missed, axis=1) - np.sum(normal**2, axis=1)
-    return float(np.mean(old + gained > THRESHOLD)), float(d[:, 0] @ weight @ d[:, 0])
+    return float(np.mean(old + gained > BETTER_BY)), float(d[:, 0] @ weight @ d[:, 0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -314,7 +314,7 @@ def simulate_refits(
             continue
         values, signals = zip(*(fitted_again(r, new, seen) for r in rivals), strict=True)
         apart = np.array([np.linalg.norm(s - signals[right]) for s in signals])
-        margin = np.array(values) - values[right] - THRESHOLD
+        margin = np.array(values) - values[right] - BETTER_BY
         won = ndtr(margin / np.maximum(2.0 * apart, 1e-9))
         won[right] = 1.0
         chances.append(won)
@@ -332,5 +332,5 @@ def fitted_again(rival: Rival, new: NewSignals, seen: Array) -> tuple[float, Arr
     start = np.clip(rival.z, 0.0, 1.0)
     if not np.isfinite(both.chi2(start)[0]):
         return rival.criterion + float(seen @ seen), np.zeros_like(seen)
-    z = descend(both, [start], TOLERANCE)
+    z = descend(both, [start], REFIT_TOLERANCE)
     return rival.criterion + float(both.chi2(z)[0]), new(rival, z[np.newaxis])[0]

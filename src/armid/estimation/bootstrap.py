@@ -22,7 +22,7 @@ from armid.model import Array
 from armid.problem.fitness import Fitness
 from armid.problem.problem import (
     LANES,
-    MOST_VALUES,
+    MOST_AT_ONCE,
     Replay,
     by_record,
     fitness_of,
@@ -33,7 +33,7 @@ from armid.problem.problem import (
 from armid.problem.space import Space
 
 # Draws, enough for a standard deviation to 7 %; where the estimates are skewed so many, for quantiles.
-DRAWS, MANY_DRAWS = 100, 400
+FIRST_DRAWS, MANY_DRAWS = 100, 400
 # Skewness above which a standard deviation says too little; of 100 normal draws it scatters by 0.24.
 SKEWED = 0.5
 # First step of a refinement, and the step at which it has converged, in standard deviations of the Cramer-Rao bound.
@@ -103,7 +103,7 @@ def bootstrap(
         return without(x, f"the records do not determine {', '.join(unknown)}")
     task = Task(fitness, replays, space, x, information)
     rng = np.random.default_rng(seed)
-    scatter = refined(task, task.noises(rng, DRAWS), rng, progress)
+    scatter = refined(task, task.noises(rng, FIRST_DRAWS), rng, progress)
     if not scatter.doubt and np.abs(skew(scatter.draws)).max() > SKEWED:
         scatter = refined(task, task.noises(rng, MANY_DRAWS), rng, progress)
     return scatter
@@ -172,7 +172,7 @@ class Task:
     def values(self, U: Array, measured: Array) -> Array:
         """Return the fitness of the candidates of each draw, (n_draws, n_candidates), from U with a last axis more."""
         n_draws, n_candidates, n = U.shape
-        size = max(MOST_VALUES // (n_candidates * measured.shape[1]), LANES)
+        size = max(MOST_AT_ONCE // (n_candidates * measured.shape[1]), LANES)
         values = np.empty((n_draws, n_candidates))
         for begin in range(0, n_draws, size):
             part = slice(begin, begin + size)
@@ -203,7 +203,7 @@ def refined(task: Task, measured: Array, rng: np.random.Generator, progress: Cal
     deviation = np.std(kept, axis=0, ddof=1)
     low, high = x - NORMAL_95 * deviation, x + NORMAL_95 * deviation
     skewed = np.abs(skew(kept)) > SKEWED
-    if len(kept) > DRAWS:
+    if len(kept) > FIRST_DRAWS:
         ends = np.quantile(kept, (0.025, 0.975), axis=0)
         low, high = np.where(skewed, ends[0], low), np.where(skewed, ends[1], high)
     moved = (draws[0] - x) / np.maximum(deviation, 1e-300)

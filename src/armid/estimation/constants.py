@@ -17,13 +17,13 @@ from armid.problem.problem import Replay, signals_of, with_each
 from armid.record import Piece, Record
 
 # Relative step of the differences.
-STEP = 1e-4
+CONSTANT_STEP = 1e-4
 # Columns whose cosine is within this of 1 are one; a column below this share of the longest moves nothing.
-ONE, NOTHING = 1e-6, 1e-7
+ONE, NO_RESPONSE = 1e-6, 1e-7
 # Combinations of relative changes that move the signal by less than this share of what each alone does are not seen.
-UNSEEN = 1e-5
+UNSEEN_SHARE = 1e-5
 # Exponents within this of a whole number are written as whole.
-WHOLE = 0.02
+WHOLE_CHANGE = 0.02
 NAMED = "constant:"
 
 
@@ -43,7 +43,7 @@ class Product:
     @property
     def public(self) -> str:
         """Name in reports, such as `constant:L_loaded*m_loaded`; `+` joins the members of a sum."""
-        is_product = all(abs(abs(e) - 1.0) < WHOLE for e in self.exponents)
+        is_product = all(abs(abs(e) - 1.0) < WHOLE_CHANGE for e in self.exponents)
         signs = [("*" if e > 0.0 else "/") if is_product else "+" for e in self.exponents[1:]]
         return NAMED + self.names[0] + "".join(s + n for s, n in zip(signs, self.names[1:], strict=True))
 
@@ -79,10 +79,10 @@ def slopes_of_constants(records: LeastSquaresProblem, z: Array, names: Sequence[
     n = len(names)
     if not n:
         return np.empty((0, len(records.measured)))
-    moves = dict(zip(names, np.hstack([STEP * np.eye(n), -STEP * np.eye(n)]), strict=True))
+    moves = dict(zip(names, np.hstack([CONSTANT_STEP * np.eye(n), -CONSTANT_STEP * np.eye(n)]), strict=True))
     candidates = np.repeat(records.whole(z[np.newaxis]), 2 * n, axis=0)
     sides = records.weighted(signals_of(records.replays, candidates, moves))
-    slopes = (sides[:n] - sides[n:]) / (2.0 * STEP)
+    slopes = (sides[:n] - sides[n:]) / (2.0 * CONSTANT_STEP)
     return np.where(np.isfinite(slopes).all(axis=1, keepdims=True), slopes, 0.0)
 
 
@@ -93,7 +93,7 @@ def products(records: LeastSquaresProblem, z: Array, tolerances: Mapping[str, fl
         return ()
     slopes = slopes_of_constants(records, z, names)
     lengths = np.linalg.norm(slopes, axis=1)
-    left, products = [i for i in range(len(names)) if lengths[i] > NOTHING * lengths.max()], []
+    left, products = [i for i in range(len(names)) if lengths[i] > NO_RESPONSE * lengths.max()], []
     while left:
         first = left[0]
         cosines = {i: float(slopes[first] @ slopes[i]) / (lengths[first] * lengths[i]) for i in left}
@@ -119,7 +119,7 @@ def common_factors(names: Sequence[str], slopes: Array, products: Sequence[Produ
     columns = np.column_stack([slopes, *(p.slope for p in products)])
     lengths = np.linalg.norm(columns, axis=0)
     labels = [*names, *(p.public.removeprefix(NAMED) for p in products)]
-    seen = [i for i, length in enumerate(lengths) if length > NOTHING * lengths.max()]
+    seen = [i for i, length in enumerate(lengths) if length > NO_RESPONSE * lengths.max()]
     small: Array = np.asarray(np.linalg.qr(columns[:, seen] / lengths[seen], mode="r"))
     said: dict[frozenset[str], str] = {}
     for place, i in enumerate(seen):
@@ -133,7 +133,7 @@ def common_factors(names: Sequence[str], slopes: Array, products: Sequence[Produ
             labels[seen[k]]: float(w * lengths[i] / lengths[seen[k]]) for k, w in zip(members, weights, strict=True)
         }
         text = f"these records give {', '.join(powers)} up to a common factor"
-        if any(abs(e - 1.0) > WHOLE for e in powers.values()):
+        if any(abs(e - 1.0) > WHOLE_CHANGE for e in powers.values()):
             changes = ", ".join(f"{label} {e:+.2g} %" for label, e in powers.items())
             text = f"these records do not tell a change of {changes}, made together"
         said.setdefault(frozenset(powers), text)
@@ -146,7 +146,7 @@ def smallest_span(columns: Array, place: int, others: Sequence[int]) -> list[int
     def spans(members: Sequence[int]) -> bool:
         chosen = columns[:, list(members)]
         rest = columns[:, place] - chosen @ np.linalg.lstsq(chosen, columns[:, place], rcond=None)[0]
-        return float(np.linalg.norm(rest)) < UNSEEN
+        return float(np.linalg.norm(rest)) < UNSEEN_SHARE
 
     for size in (1, 2):
         for members in combinations(others, size):

@@ -14,18 +14,18 @@ from armid.record.start import Track, state_shown
 
 IN_DEGREES = 180.0 / np.pi
 # Units in which a mistake can be made that is one of angles and turning speeds, of turning speeds, of any signal.
-ANGULAR, TURNING, ANY = ("rad", "rad/s"), ("rad/s",), ()
+ANGULAR, TURNING_UNITS, ANY = ("rad", "rad/s"), ("rad/s",), ()
 # Factor that undoes a mistake -> kind, units of the signals in which it can be, words. Inputs have those of any signal.
 FACTORS = {
     -1.0: ("sign", ANY, "its sign looks inverted: with the other one"),
     IN_DEGREES: ("unit", ANGULAR, "57.3 times too small, as radians under a header in degrees are: in the other unit"),
     1.0 / IN_DEGREES: ("unit", ANGULAR,
                        "57.3 times too large, as degrees under a header in radians are: in the other unit"),
-    30.0 / np.pi: ("unit", TURNING,
+    30.0 / np.pi: ("unit", TURNING_UNITS,
                    "9.55 times too small, as a mistake between rad/s and revolutions per minute makes it: corrected"),
-    np.pi / 30.0: ("unit", TURNING,
+    np.pi / 30.0: ("unit", TURNING_UNITS,
                    "9.55 times too large, as revolutions per minute under a header in rad/s are: corrected"),
-    6.0: ("unit", TURNING, "6 times too small, as revolutions per minute under a header in deg/s are: corrected"),
+    6.0: ("unit", TURNING_UNITS, "6 times too small, as revolutions per minute under a header in deg/s are: corrected"),
     10.0: ("unit", ANY, "10 times too small: ten times as large"),
     0.1: ("unit", ANY, "10 times too large: a tenth as large"),
     1000.0: ("unit", ANY, "1,000 times too small, as thousands under a plain unit are: corrected"),
@@ -36,7 +36,7 @@ FACTORS = {
 TURNS = (90.0, -90.0, 180.0)
 # Samples that a piece must keep.
 FEWEST_LEFT = 20
-TIMES = {
+TIME_FACTORS = {
     0.001: "time_s looks like milliseconds: in seconds",
     1000.0: "time_s looks like thousands of seconds: in seconds",
     0.1: "time_s looks ten times too long: a tenth as long",
@@ -82,7 +82,7 @@ class Correction:
         return DataIssue(self.kind, record, f"{said}.", after)
 
 
-BOUNDS = Correction("bounds", np.nan, "bounds or fixed values look wrong: with those that the model declares",
+WIDER_BOUNDS = Correction("bounds", np.nan, "bounds or fixed values look wrong: with those that the model declares",
                     lambda record: record)  # fmt: skip
 
 
@@ -116,7 +116,7 @@ def corrections_of_sizes(plant: Plant, record: Record) -> Iterator[Correction]:
         for name in (i.name for i in plant.inputs if not units):
             yield Correction("input", factor, f"input '{name}': {words}",
                        of_pieces(partial(with_input, name=name, factor=factor)))  # fmt: skip
-    for factor, words in TIMES.items():
+    for factor, words in TIME_FACTORS.items():
         yield Correction("time", factor, words, partial(with_interval, plant=plant, factor=factor))
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.engine import Calibration, Schedule, probes
-from armid.estimation.corrections import BOUNDS, Correction, DataIssue, corrections, of_pieces, rms
+from armid.estimation.corrections import WIDER_BOUNDS, Correction, DataIssue, corrections, of_pieces, rms
 from armid.estimation.least_squares import WeightedRecords, descend
 from armid.model import Array, Manoeuvre, Model, Plant
 from armid.problem.problem import ReadyRecord
@@ -33,36 +33,37 @@ CORRECTED, LEFT, AS_GOOD = 0.4, 0.5, 1.5
 # What is left of the error by a factor of two, which a missing spring or friction can imitate.
 LEFT_BY_TWO = 0.2
 # An error above this, with no candidate of this cosine to the signal: the model explains nothing of it.
-NOTHING, UNLIKE = 0.95, 0.3
+NOTHING_GAINED, UNLIKE = 0.95, 0.3
 # An error up to this, where the model explains nothing as declared, shows an exchange that a missing effect half hides.
 EXCHANGED = 0.6
-# A record disagrees if its error is APART times that of the others. Errors well below AGREED count as agreement.
-APART, AGREED = 3.0, 0.05
+# A record disagrees if its error is APART_IN_NOISE times that of the others. Errors well below AGREED count as
+# agreement.
+APART_IN_NOISE, AGREED = 3.0, 0.05
 # Candidates spread over the box, samples of all records together that are looked at, least of one record.
-N_SPREAD, MOST_SAMPLES, FEWEST_SAMPLES = 128, 16_000, 500
+N_SPREAD_CHECKED, MOST_CHECKED, FEWEST_CHECKED = 128, 16_000, 500
 # The corrections that leave least are fitted once more, as the declared model is: how many, from how many candidates,
 # and from how many of the best.
 N_LIKELY, N_HARD, N_BEST = 5, 512, 8
-MOST_VALUES, MOST_APART = 2**24, 6
+MOST_CORRECTED, MOST_APART = 2**24, 6
 # What fits nearly as well is looked for at so many candidates each within these shares of the ranges.
-N_NEAR, NEAR = 64, (0.001, 0.003, 0.01)
+N_NEAR, NEAR_SHARES = 64, (0.001, 0.003, 0.01)
 # Kinds of issue that name both records, or that the model has against one whatever the other says.
-SURE = ("exchanged", "unlike", "unjudged")
+SURE_KINDS = ("exchanged", "unlike", "unjudged")
 # Train records up to so many are few; samples that two of them must have in common to be exchanged.
-FEW, FEWEST_COMMON = 3, 100
+FEW_RECORDS, FEWEST_COMMON = 3, 100
 # Share of a signal by which a simulation may change when samples of a long record are left out.
-SAME = 0.01
+SAME_ERROR = 0.01
 # A clock that is off by fewer samples, or by more than this share of the record, is not looked for.
 LEAST_SHIFT, MOST_SHIFT = 3, 0.3
 # Integration steps between samples, relative fall of squares at which a rough fit has arrived.
-SUBSTEPS, TOLERANCE = 4, 1e-3
+SUBSTEPS_CHECKED, CHECK_TOLERANCE = 4, 1e-3
 # Longest sample interval of a motion that a motor drives [s].
 LONGEST_INTERVAL = 1.0
 # A record begins elsewhere than the model where each of so many first samples is more than so many times the noise, and
 # than this share of the motion, away.
-FIRST, ELSEWHERE, FAR_OF_MOTION = 3, 10.0, 0.02
+FIRST_SAMPLES, ELSEWHERE, FAR_OF_MOTION = 3, 10.0, 0.02
 # Successive samples, of so many values, that two recordings do not have in common by chance.
-ALIKE, DIFFERENT = 40, 10
+ALIKE_VALUES, DIFFERENT = 40, 10
 # Rest that scatters by this share of the motion's rms in fewer independent samples, or has this mean, is not a rest.
 RESTLESS, LARGE_MEAN = 0.02, 0.2
 
@@ -113,7 +114,7 @@ class Trial:
         self.model, self.space = model, space
 
     def problem(self, records: Sequence[Record]) -> WeightedRecords:
-        rough = Calibration(Schedule(SUBSTEPS), np.nan, True)
+        rough = Calibration(Schedule(SUBSTEPS_CHECKED), np.nan, True)
         prepared = [ReadyRecord(r, self.model, (rough,) * len(r.pieces)) for r in records]
         ready = tuple(one for record in prepared for one in record.each)
         # of an angle or a position the zero says nothing
@@ -138,9 +139,9 @@ class Trial:
         means = np.add.reduceat(np.array(squares).T, np.cumsum(counts) - counts, axis=1) / counts
         return np.asarray(np.nan_to_num(np.sqrt(means), nan=np.inf))
 
-    def spread(self, records: Sequence[Record], most: int = N_SPREAD) -> Array:
+    def spread(self, records: Sequence[Record], most: int = N_SPREAD_CHECKED) -> Array:
         n_samples, n = sum(r.n_samples for r in records), int(self.space.free.sum())
-        spread = probes(np.zeros(n), np.ones(n), max(min(most, MOST_VALUES // n_samples), 8))
+        spread = probes(np.zeros(n), np.ones(n), max(min(most, MOST_CORRECTED // n_samples), 8))
         # ranges are wide, and most machines lie in their lower part
         spread[::2] **= 3
         return spread
@@ -156,7 +157,7 @@ class Trial:
             rarer = every(record, step, self.model.plant)
             kept = [signal[:, -record.pieces[0].window.start % step :: step] for signal in signals]
             pairs = zip(self.signals(rarer, Z), kept, strict=True)
-            if all(float(np.linalg.norm(a - b)) <= SAME * float(np.linalg.norm(b)) for a, b in pairs):
+            if all(float(np.linalg.norm(a - b)) <= SAME_ERROR * float(np.linalg.norm(b)) for a, b in pairs):
                 return rarer
             step //= 2
         return record
@@ -200,7 +201,7 @@ class Trial:
         best = np.argsort(errors, kind="stable")[:n_best]
         if not (self.space.free.any() and errors[best[0]] < below):
             return np.asarray(starts[best[0]]), float(errors[best[0]])
-        z = descend(self.problem(records), list(starts[best[np.isfinite(errors[best])]]), TOLERANCE)
+        z = descend(self.problem(records), list(starts[best[np.isfinite(errors[best])]]), CHECK_TOLERANCE)
         return z, rms(self.errors(records, z))
 
     def fit_hard(self, records: Sequence[Record], others: Sequence[Array]) -> tuple[Array, float]:
@@ -225,7 +226,7 @@ def mistakes(trial: Trial, train: Sequence[Record]) -> tuple[list[DataIssue], Ar
     declared = space_of(trial.model)
     if not all(np.array_equal(getattr(declared, n), getattr(trial.space, n), True) for n in ("low", "high", "fixed")):
         own = Trial(trial.model, declared)
-        tried.append((*own.fit(train), BOUNDS, own, tuple(train)))
+        tried.append((*own.fit(train), WIDER_BOUNDS, own, tuple(train)))
     # a poor fit of the declared model is not a mistake of the records, and of two corrections the better one is named
     likely = sorted(tried, key=lambda t: t[1])[:N_LIKELY]
     starts = [z, *(t[0] for t in likely)]
@@ -241,12 +242,14 @@ def mistakes(trial: Trial, train: Sequence[Record]) -> tuple[list[DataIssue], Ar
     z = agreed(trial, train, z)
     errors = trial.errors(train, z)[0]
     typical = typical_of(errors)
-    outside = [train[i] for i in np.argsort(-errors)[:MOST_APART] if errors[i] > max(TOLERABLE, APART * typical)]
+    outside = [
+        train[i] for i in np.argsort(-errors)[:MOST_APART] if errors[i] > max(TOLERABLE, APART_IN_NOISE * typical)
+    ]
     issues = exchanged(trial, train, outside, before) or [s for r in outside for s in apart(trial, r, z, typical)]
     if not issues and not everywhere and trial.model.plant.from_rest:
         # a driven machine drifts away from a model without friction
         issues = [unlike(r.file, e) for r, e in zip(train, errors, strict=True)
-                  if NOTHING < e < np.inf and trial.likeness(r) < UNLIKE]  # fmt: skip
+                  if NOTHING_GAINED < e < np.inf and trial.likeness(r) < UNLIKE]  # fmt: skip
     return issues or everywhere, z
 
 
@@ -255,7 +258,7 @@ def of_few(trial: Trial, train: Sequence[Record], before: float, below: float) -
 
     Of two or three records no majority says which are right: each correction is fitted together with the others.
     """
-    if not 1 < len(train) <= FEW:
+    if not 1 < len(train) <= FEW_RECORDS:
         return []
     tried = []
     for changes in changes_of_few(trial, train):
@@ -267,7 +270,7 @@ def of_few(trial: Trial, train: Sequence[Record], before: float, below: float) -
         z, error = own.fit_hard(undone, [start])
         if own.errors(undone, z).max() <= TOLERABLE:
             sufficient.append((error, file, correction))
-        elif correction.other and before > NOTHING and error <= EXCHANGED:
+        elif correction.other and before > NOTHING_GAINED and error <= EXCHANGED:
             hidden.append((error, file, correction))
     if not sufficient:
         best = min(hidden, key=lambda f: f[0], default=None)
@@ -282,7 +285,7 @@ def of_two(issues: Sequence[DataIssue], train: Sequence[Record]) -> list[DataIss
     if len(train) != 2:
         return list(issues)
     doubt = f" {train[0].file} and {train[1].file} disagree: one of the two is wrong, and no third record tells which."
-    return [replace(s, sentence=f"{s.sentence}{doubt}") if s.record and s.kind not in SURE else s for s in issues]
+    return [replace(s, sentence=f"{s.sentence}{doubt}") if s.record and s.kind not in SURE_KINDS else s for s in issues]
 
 
 def changes_of_few(trial: Trial, train: Sequence[Record]) -> Iterator[dict[str, Correction]]:
@@ -304,7 +307,7 @@ def agreed(trial: Trial, train: Sequence[Record], z: Array) -> Array:
     errors = trial.errors(train, candidates)
     with np.errstate(over="ignore"):
         best = int(np.argmin(np.sum(np.log1p((errors / AGREED) ** 2), axis=1)))
-    inside = [r for r, e in zip(train, errors[best], strict=True) if e <= APART * typical_of(errors[best])]
+    inside = [r for r, e in zip(train, errors[best], strict=True) if e <= APART_IN_NOISE * typical_of(errors[best])]
     return trial.fit(inside, candidates[best : best + 1])[0] if inside else candidates[best]
 
 
@@ -316,7 +319,7 @@ def typical_of(errors: Array) -> float:
 def apart(trial: Trial, record: Record, z: Array, typical: float) -> list[DataIssue]:
     """Return the mistake of one record, judged at a candidate that is not fitted to it, none where it is as others."""
     before = float(trial.errors([record], z)[0, 0])
-    if before <= max(TOLERABLE, APART * typical):
+    if before <= max(TOLERABLE, APART_IN_NOISE * typical):
         return []
     undone = [(m, m.undo(record)) for m in trial.corrections(record, z[np.newaxis])]
     tried = [(float(trial.errors([r], z)[0, 0]), m) for m, r in undone]
@@ -330,7 +333,7 @@ def least_nearby(trial: Trial, train: Sequence[Record], record: Record, z: Array
     Where next to nothing decides how a machine moves on, as over the top, what they leave open is not a mistake.
     """
     n = len(z)
-    near = np.concatenate([z + r * (2.0 * probes(np.zeros(n), np.ones(n), N_NEAR) - 1.0) for r in NEAR])
+    near = np.concatenate([z + r * (2.0 * probes(np.zeros(n), np.ones(n), N_NEAR) - 1.0) for r in NEAR_SHARES])
     near = np.clip(near, 0.0, 1.0)
     most = max(TOLERABLE, AS_GOOD * float(trial.errors(train, z).max()))
     near = near[trial.errors(train, near).max(axis=1) <= most]
@@ -391,7 +394,7 @@ def driven_as(piece: Piece, constants: Mapping[str, float], inputs: Mapping[str,
 
 
 def most_samples(n_records: int) -> int:
-    return max(MOST_SAMPLES // n_records, FEWEST_SAMPLES)
+    return max(MOST_CHECKED // n_records, FEWEST_CHECKED)
 
 
 def shortened(record: Record, n_records: int) -> Record:
@@ -399,7 +402,7 @@ def shortened(record: Record, n_records: int) -> Record:
     pieces, left = [], most_samples(n_records)
     for piece in record.pieces:
         start, n = piece.window.start, min(piece.window.stop - piece.window.start, left)
-        if n < min(FEWEST_SAMPLES, piece.window.stop - start):
+        if n < min(FEWEST_CHECKED, piece.window.stop - start):
             break
         pieces.append(replace(piece, window=slice(start, start + n)).until_window_end())
         left -= n
@@ -432,7 +435,7 @@ def begun_elsewhere(trial: Trial, train: Sequence[Record], z: Array) -> Iterator
     away: dict[str, list[tuple[float, str]]] = {}
     for record in train:
         for one, simulated in zip(record.each, trial.signals(record, z[np.newaxis]), strict=True):
-            off, piece = one.measured[:FIRST] - simulated[0][:FIRST], one.pieces[0]
+            off, piece = one.measured[:FIRST_SAMPLES] - simulated[0][:FIRST_SAMPLES], one.pieces[0]
             least = max(ELSEWHERE * one.noise.rms, FAR_OF_MOTION * float(np.ptp(one.measured)))
             known = one.unit in ("rad", "m") and not piece.window.start and not piece.start_deviation
             if known and abs(np.sign(off).sum()) == off.size and float(np.min(np.abs(off))) > least:
@@ -509,18 +512,18 @@ def given_twice(records: Sequence[Record]) -> Iterator[DataIssue]:
         a, b = records[i], records[j]
         if a.manoeuvre_file == b.manoeuvre_file:
             continue
-        yield DataIssue("twice", a.file, f"{a.file} and {b.file} hold the same {n + ALIKE - 1} samples: one recording "
-                        "is given twice, records that do not overlap are expected.")  # fmt: skip
+        yield DataIssue("twice", a.file, f"{a.file} and {b.file} hold the same {n + ALIKE_VALUES - 1} samples: one "
+                        "recording is given twice, records that do not overlap are expected.")  # fmt: skip
 
 
 def fingerprints(values: Array) -> NDArray[np.uint64]:
     """Return a number for each run of `ALIKE` samples that takes `DIFFERENT` values or more, each run once."""
-    n = len(values) - ALIKE + 1
+    n = len(values) - ALIKE_VALUES + 1
     if n < 1:
         return np.empty(0, dtype=np.uint64)
     bits, hashes = np.ascontiguousarray(values + 0.0).view(np.uint64), np.zeros(n, dtype=np.uint64)
     changes = np.append(0, np.cumsum(values[1:] != values[:-1]))
-    for i in range(ALIKE):
+    for i in range(ALIKE_VALUES):
         hashes = hashes * np.uint64(0x100000001B3) + bits[i : i + n]
         hashes ^= hashes >> np.uint64(29)
-    return np.unique(hashes[changes[ALIKE - 1 :] - changes[:n] >= DIFFERENT])
+    return np.unique(hashes[changes[ALIKE_VALUES - 1 :] - changes[:n] >= DIFFERENT])

@@ -23,21 +23,21 @@ Key = float | bool | str
 BOX = 12.0
 VOLUME, WORST, SHRINKAGE = "volume", "worst", "shrinkage"
 # How many places of the travel are tried, its ends left alone by so much of it; start and target are so far apart.
-N_PLACES, MARGIN, APART = 6, 0.05, 0.15
+N_PLACES_OF_STROKE, ENDS_LEFT, APART_SHARE = 6, 0.05, 0.15
 # A place is rounded by at most this share of the range.
 ROUGHEST = 0.02
 # Part of its largest recorded value to which another key is turned down (a supply); a higher one may be unsafe.
 TURNED_DOWN, MOST_LEVELS = 0.85, 3
 # What is done to recorded inputs: size, and how many times as fast.
-SIZES, PACES = (1.0, -1.0, 0.5, -0.5), (1.0, 2.0, 0.5)
+SIZES_OF_INPUTS, PACES = (1.0, -1.0, 0.5, -0.5), (1.0, 2.0, 0.5)
 # How much finer than the records asked for time is cut: a manoeuvre that nobody calibrated may be stiffer.
-FINER = 2
+FINER_GRID = 2
 # A speed below this part of the fastest record's rms is not motion.
-MOVES = 0.05
+MOVED_AT_LEAST = 0.05
 # States of a machine that is driven by inputs may range this much wider than in its records.
-WIDER = 1.05
+WIDER_STATES = 1.05
 # Ends of keys that are units, and how people write them.
-UNITS = {
+UNITS_OF_KEYS = {
     "rad_s": "rad/s", "deg_s": "deg/s", "m_s": "m/s", "N_m": "N m", "rad": "rad", "deg": "deg", "kg": "kg", "V": "V",
     "A": "A", "N": "N", "m": "m", "s": "s",
 }  # fmt: skip
@@ -165,7 +165,7 @@ def keyed(plant: Plant, records: Sequence[Record]) -> Iterator[Feasible]:
     for values in product(*(key_levels(plant, k, records) for k in plant.keys)):
         keys = dict(zip((k.key for k in plant.keys), values, strict=True))
         # Places that must be unlike each other (start and target) are far enough apart to be a motion.
-        apart = (abs(keys[a.key] - keys[b.key]) >= APART * ((a.high or 0.0) - (a.low or 0.0)) for a, b in pairs)
+        apart = (abs(keys[a.key] - keys[b.key]) >= APART_SHARE * ((a.high or 0.0) - (a.low or 0.0)) for a, b in pairs)
         if keys and all(apart):
             constants = {k.constant: float(keys[k.key]) * k.factor for k in plant.keys}
             yield Feasible(keys, piece.with_constants(constants).manoeuvre, piece.window)
@@ -176,10 +176,10 @@ def key_levels(plant: Plant, key: ManoeuvreKey, records: Sequence[Record]) -> tu
         return (True, False)
     low, high = range_of(key)
     if is_place(plant, key):
-        room = MARGIN * (high - low)
+        room = ENDS_LEFT * (high - low)
         # whole units where the range is one of many, as in degrees; else as fine as tells the places apart
         decimals = max(0, int(np.ceil(-np.log10(ROUGHEST * (high - low)))))
-        return tuple(float(v) for v in np.round(np.linspace(low + room, high - room, N_PLACES), decimals))
+        return tuple(float(v) for v in np.round(np.linspace(low + room, high - room, N_PLACES_OF_STROKE), decimals))
     default = next(c.value for c in plant.constants if c.name == key.constant)
     recorded = {round(r.constants.get(key.constant, default) / key.factor, 9) for r in records}
     some = sorted(recorded, reverse=True)[:MOST_LEVELS]
@@ -221,7 +221,7 @@ def changed_inputs(records: Sequence[Record]) -> Iterator[Feasible]:
     manoeuvre starts at the opposite speed.
     """
     # the first pair is size 1 and pace 1: what was recorded
-    for record, (size, pace) in product(records, list(product(SIZES, PACES))[1:]):
+    for record, (size, pace) in product(records, list(product(SIZES_OF_INPUTS, PACES))[1:]):
         piece = record.pieces[0].until_window_end()
         start = {n: v * np.sign(size) for n, v in piece.manoeuvre.constants.items() if n == "start_speed"}
         manoeuvre = piece.with_constants(start).manoeuvre
@@ -265,14 +265,14 @@ def key_words(key: str, value: Key) -> str:
         return key if value else f"no {key}"
     if isinstance(value, str):
         return f"{key} {value}"
-    unit = next((u for u in UNITS if key.endswith(f"_{u}")), "")
+    unit = next((u for u in UNITS_OF_KEYS if key.endswith(f"_{u}")), "")
     name = key.removesuffix(f"_{unit}")
-    text = f"{value:g} {UNITS[unit]}" if unit else f"{value:g}"
+    text = f"{value:g} {UNITS_OF_KEYS[unit]}" if unit else f"{value:g}"
     return text if name == "supply" else f"{name} {text}"
 
 
 def fine_schedule(replays: Sequence[Replay]) -> Schedule:
-    return Schedule(FINER * max(c.schedule.substeps for r in replays for c in r.calibrations))
+    return Schedule(FINER_GRID * max(c.schedule.substeps for r in replays for c in r.calibrations))
 
 
 class Motions:
@@ -293,8 +293,8 @@ class Motions:
         self.candidate = candidate
         self.speed_limit = np.inf if speed_limit is None else speed_limit
         self.places = sorted({r.place for r in replays})
-        self.slowest = [MOVES * max(float(np.sqrt(np.mean(r.measured**2))) for r in replays if r.place == place)
-                        for place in self.places]  # fmt: skip
+        rms = [(r.place, float(np.sqrt(np.mean(r.measured**2)))) for r in replays]
+        self.slowest = [MOVED_AT_LEAST * max(size for p, size in rms if p == place) for place in self.places]
         self.travel = key_travel(self.model.plant)
         self.extents = self._recorded_extents(replays) if self.model.plant.inputs else {}
 
@@ -325,5 +325,5 @@ class Motions:
         widest = {name: 0.0 for name, state in self.model.states.items() if state.column}
         for piece in (piece for replay in replays for piece in replay.pieces):
             run = simulate(self.model, piece.manoeuvre, self.candidate[np.newaxis], self.schedule, states=True)
-            widest = {name: max(wide, WIDER * float(np.ptp(run.states[name]))) for name, wide in widest.items()}
+            widest = {name: max(wide, WIDER_STATES * float(np.ptp(run.states[name]))) for name, wide in widest.items()}
         return widest

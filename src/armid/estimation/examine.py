@@ -37,12 +37,12 @@ from armid.report.result import IDENTIFIABILITY, Kind, Result
 
 RANKINGS = (VOLUME, WORST, SHRINKAGE)
 # Of a noise that is given: the rounding of a speed is larger.
-LEAST_NOISE = 1e-15
+LEAST_EXAMINED = 1e-15
 Members = tuple[int, ...]
 # From here on a group is reported; Brun et al. call indices above 10 to 15 poorly identifiable.
 CRITICAL = 10.0
 # A group explains the collinearity of a larger set when its index reaches this share of the set's.
-EXPLAINS = 0.5
+EXPLAINS_HALF = 0.5
 # Above this number of parameters only groups of up to so many members are tried, or all of them.
 MOST_TRIED, LARGEST_TRIED = 12, 4
 
@@ -72,7 +72,7 @@ def groups(fisher: Array, names: tuple[str, ...]) -> tuple[Group, ...]:
     scale = np.sqrt(np.diag(fisher)[seen])
     left, groups = tuple(range(len(visible))), []
     while (index := index_of(scaled, left)) >= CRITICAL:
-        members = smallest(scaled, left, max(CRITICAL, EXPLAINS * index))
+        members = smallest(scaled, left, max(CRITICAL, EXPLAINS_HALF * index))
         _, vectors = np.linalg.eigh(scaled[np.ix_(members, members)])
         moves = vectors[:, 0] / scale[list(members)]
         moves = moves / moves[int(np.argmax(np.abs(moves)))]
@@ -159,9 +159,9 @@ def examine(
         raise ArmidError("no parameter is free: at least one is expected to be examined")
     if by not in RANKINGS:
         raise ArmidError(f"offers are to be ranked by '{by}': {nearest(by, RANKINGS)}")
-    if noise is not None and not LEAST_NOISE <= noise <= 1.0 / LEAST_NOISE:
-        raise ArmidError(f"the noise is {noise:g}: a finite number above 0 is expected, {LEAST_NOISE:g} to "
-                         f"{1.0 / LEAST_NOISE:g}")  # fmt: skip
+    if noise is not None and not LEAST_EXAMINED <= noise <= 1.0 / LEAST_EXAMINED:
+        raise ArmidError(f"the noise is {noise:g}: a finite number above 0 is expected, {LEAST_EXAMINED:g} to "
+                         f"{1.0 / LEAST_EXAMINED:g}")  # fmt: skip
     if x is not None and np.shape(x) != (len(space.free_names),):
         names = ", ".join(space.free_names)
         raise ArmidError(f"the point has the shape {np.shape(x)}: one value for each of {names} is expected")

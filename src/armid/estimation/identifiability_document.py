@@ -10,7 +10,7 @@ from armid.estimation.design import Offer, identity
 from armid.estimation.examine import Examination, Group, collinearity_index
 from armid.estimation.figures import PAIRS, pairs_of
 from armid.estimation.identify import versions_of
-from armid.estimation.information import THRESHOLD, Profile, normalised, sensitivities
+from armid.estimation.information import PROFILE_RISE, Profile, normalised, sensitivities
 from armid.estimation.noise_model import Level, level_weights
 from armid.model import Array
 from armid.report.document import (
@@ -30,11 +30,11 @@ from armid.report.result import Parts
 from armid.report.style import GREY, OKABE_ITO, look, pyplot
 from armid.units import scale_of, shown
 
-PACKAGES = ("armid", "numpy", "scipy", "numba")
+PACKAGES_OF_IDENTIFIABILITY = ("armid", "numpy", "scipy", "numba")
 UNDETERMINED = "not determined"
-MOST_OFFERS, MOST_COLUMNS, MOST_NAMED = 8, 5, 6
+MOST_OFFERS, MOST_COLUMNS, MOST_GROUPS_SHOWN = 8, 5, 6
 # The point that was given is away from the minimum when a step there is more standard deviations than this.
-AWAY = 1.0
+DEVIATIONS_AWAY = 1.0
 # The noise of a measured start is reported when it widens an interval by more than this factor.
 WIDENS = 1.2
 FIGURES = {
@@ -191,7 +191,7 @@ def result_of(examination: Examination) -> dict[str, Any]:
         ],
         "remarks": remarks(examination),
         "for_the_record": level_remarks(examination),
-        "versions": versions_of(PACKAGES),
+        "versions": versions_of(PACKAGES_OF_IDENTIFIABILITY),
     })  # fmt: skip
 
 
@@ -294,7 +294,7 @@ def point_remarks(examination: Examination) -> list[str]:
         away = np.nan_to_num(np.abs(examination.x - examination.minimum) / deviation, nan=0.0, posinf=0.0)
         wider = deviation / np.array([p.deviation for p in examination.profiles])
     wider = np.nan_to_num(wider, nan=1.0, posinf=1.0)
-    if examination.given and away.max() > AWAY:
+    if examination.given and away.max() > DEVIATIONS_AWAY:
         return [f"The point that was given is not the least-squares minimum: {names[int(away.argmax())]} is "
                 f"{away.max():.3g} standard deviations from it. The profiles are drawn around the minimum. All other "
                 "results belong to the point."]  # fmt: skip
@@ -308,8 +308,10 @@ def level_remarks(examination: Examination) -> list[str]:
     texts: dict[str, list[str]] = {}
     for replay, level in zip(examination.replays, examination.information.levels, strict=True):
         texts.setdefault(level_text(level, replay.record.unit, replay.record.noise.rms), []).append(replay.name)
-    said = [f"{listed(files[:MOST_NAMED])}: {text}" for text, files in texts.items()]
-    return said[:MOST_NAMED] + ([f"So it is with {len(said) - MOST_NAMED} more."] if len(said) > MOST_NAMED else [])
+    said = [f"{listed(files[:MOST_GROUPS_SHOWN])}: {text}" for text, files in texts.items()]
+    return said[:MOST_GROUPS_SHOWN] + (
+        [f"So it is with {len(said) - MOST_GROUPS_SHOWN} more."] if len(said) > MOST_GROUPS_SHOWN else []
+    )
 
 
 def level_text(level: Level, unit: str, noise: float) -> str:
@@ -337,8 +339,8 @@ def offer_text(examination: Examination, offer: Offer) -> str:
 CURVE, QUADRATIC, LIMIT = OKABE_ITO["blue"], OKABE_ITO["vermilion"], OKABE_ITO["black"]
 # The top of a profile's panel, and by how much its sides go beyond what was tried, as a share.
 TOP, SIDE = 6.5, 0.04
-MOST_RECORDS, MOST_PANELS = 4, 12
-LINE = 60
+MOST_RECORDS_SHOWN, MOST_PANELS = 4, 12
+LINE_WIDTH = 60
 
 
 def figures_of(examination: Examination) -> dict[str, Callable[[], Any]]:
@@ -361,7 +363,7 @@ def profile_figure(examination: Examination) -> Any:
         axis.set_ylabel("rise of chi2")
     handles = dict(pair for axis in axes.flat for pair in zip(*axis.get_legend_handles_labels()[::-1], strict=True))
     figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3, frameon=False)
-    figure.suptitle(fill(f"{title(examination)}: profile likelihood", LINE * columns // 2 + 15), fontsize="large")
+    figure.suptitle(fill(f"{title(examination)}: profile likelihood", LINE_WIDTH * columns // 2 + 15), fontsize="large")
     return figure
 
 
@@ -374,7 +376,7 @@ def draw_profile(axis: Any, profile: Profile) -> None:
         axis.plot(grid * factor, parabola, color=QUADRATIC, ls="--", lw=1.5, zorder=3, label="by curvature")
     axis.plot(*smooth(profile, factor), color=CURVE, lw=2.0, label="profile")
     axis.plot(profile.values * factor, profile.rise, color=CURVE, marker="o", ms=4.0, ls="none", label="fitted again")
-    axis.axhline(THRESHOLD, color=LIMIT, lw=1.0, ls=":", label="95 % threshold")
+    axis.axhline(PROFILE_RISE, color=LIMIT, lw=1.0, ls=":", label="95 % threshold")
     axis.axvspan(profile.low * factor, profile.high * factor, color=CURVE, alpha=0.10, lw=0, label="95 % interval")
     for bound in profile.box:
         if left <= bound <= right:
@@ -437,7 +439,7 @@ def sensitivity_figure(examination: Examination) -> Any:
     for axis in axes[len(order) :]:
         axis.set_visible(False)
     parts[-1].legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=min(n, 6), frameon=False)
-    figure.suptitle(fill(f"{title(examination)}: what the records see", 2 * LINE), fontsize="large")
+    figure.suptitle(fill(f"{title(examination)}: what the records see", 2 * LINE_WIDTH), fontsize="large")
     return figure
 
 
@@ -447,7 +449,7 @@ def telling(examination: Examination, jacobians: list[Array]) -> list[int]:
     seen: dict[object, int] = {}
     for i in order:
         seen.setdefault((examination.replays[i].place, identity(examination.replays[i].record.manoeuvre)), int(i))
-    return list(seen.values())[:MOST_RECORDS]
+    return list(seen.values())[:MOST_RECORDS_SHOWN]
 
 
 def draw_map(axis: Any, examination: Examination, values: Array, rows: Sequence[str], label: str, **looks: Any) -> None:

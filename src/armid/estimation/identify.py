@@ -46,14 +46,14 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 # Share of a range within which a parameter is on its bound.
-ROUNDING = 1e-12
+ON_BOUND = 1e-12
 # A search that ends farther outside than this has left the box.
-OUTSIDE = 1e-9
+OUT_OF_BOX = 1e-9
 
 
-INTERRUPTED = "interrupted"
+WAS_INTERRUPTED = "interrupted"
 # Two estimates of one model that are more of their standard deviations apart than this are not of the same minimum.
-APART = 5.0
+APART_IN_DEVIATIONS = 5.0
 # A least-squares step of more standard deviations than this: a search by another fitness ends within a few.
 FAR_FROM_MINIMUM = 4.0
 # An estimate that is biased by more standard deviations has an interval that misses the truth in more than 8 %.
@@ -286,13 +286,13 @@ def identified(
             )
         # what rounding alone keeps off a bound is held by it
         low, high = space.low[space.free], space.high[space.free]
-        left = np.flatnonzero(np.maximum(low - meter.best_x, meter.best_x - high) > OUTSIDE * (high - low))
+        left = np.flatnonzero(np.maximum(low - meter.best_x, meter.best_x - high) > OUT_OF_BOX * (high - low))
         if left.size:
             i, (name, value) = left[0], (space.free_names[left[0]], meter.best_x[left[0]])
             raise ArmidError(f"identifier '{identifier.name}' leaves the box: its best candidate has {name} = "
                              f"{value:.6g}, {low[i]:.6g} to {high[i]:.6g} is expected")  # fmt: skip
-        x = np.where(meter.best_x - low < ROUNDING * (high - low), low, meter.best_x)
-        x, value = np.where(high - x < ROUNDING * (high - low), high, x), meter.best_f
+        x = np.where(meter.best_x - low < ON_BOUND * (high - low), low, meter.best_x)
+        x, value = np.where(high - x < ON_BOUND * (high - low), high, x), meter.best_f
     else:
         stopped, x = "no parameter is free", np.empty(0)
         signals, measured = signals_of(seen, space.complete(x[np.newaxis])), [r.measured for r in seen]
@@ -300,7 +300,7 @@ def identified(
     candidate = space.complete(x[np.newaxis])[0]
     errors = campaign_errors(train, candidate)
     assert errors is not None
-    information, scatter = judged(fitness, seen, space, x, seed, progress, interval and stopped != INTERRUPTED)
+    information, scatter = judged(fitness, seen, space, x, seed, progress, interval and stopped != WAS_INTERRUPTED)
     trace = meter.trace()
     return Identification(
         campaign, model, space, fitness, identifier.name, candidate, value, information,
@@ -340,7 +340,7 @@ def judged(
         deviation = scatter.draws.std(axis=0, ddof=1)
         both = np.hypot(deviation, information.deviation)
         apart = float(np.max(np.abs(x - scatter.bias - least) / both))
-        if apart > APART and not scatter.doubt:
+        if apart > APART_IN_DEVIATIONS and not scatter.doubt:
             doubt = f"it lies {apart:.3g} standard deviations from the least-squares estimate, as a local minimum does"
             scatter = replace(scatter, doubt=doubt)
         information = replace(information, deviation=deviation, step=scatter.moved,
@@ -375,11 +375,11 @@ def search(
             is_interrupt = isinstance(error, KeyboardInterrupt) or isinstance(error.__cause__, KeyboardInterrupt)
             if meter.best_x is None or not is_interrupt:
                 raise
-            return INTERRUPTED
+            return WAS_INTERRUPTED
     if meter.reached:
         return "target reached"
     if interrupted():
-        return INTERRUPTED
+        return WAS_INTERRUPTED
     if meter.exhausted:
         return "budget used" if meter.target is None else "budget used, target not reached"
     return f"{identifier.name} stopped by itself"

@@ -41,14 +41,14 @@ from armid.report.document import (
 from armid.report.result import Parts
 from armid.units import scale_of, shown
 
-PACKAGES = ("armid", "numpy", "scipy", "pandas", "numba", "pymoo", "nlopt")
+PACKAGES_OF_IDENTIFY = ("armid", "numpy", "scipy", "pandas", "numba", "pymoo", "nlopt")
 # Figures that a page takes as they are stored: name -> title and caption.
 FIGURES = {"convergence": ("The search", "Best so far against the number of simulations."), "pairs": PAIRS}
 MOST_KNOWN_FIRST = 3
 # A mean square on held-out records of more times that on the fitted ones than this.
 CARRIES_OVER = 1.5
 # Of more records than this one sentence tells.
-MOST_NAMED = 6
+MOST_RECORDS_TOLD = 6
 
 
 def identify_document(
@@ -205,7 +205,7 @@ def result_of(identification: Identification) -> dict[str, Any]:
         "outputs": identification.outputs,
         "engine_error": max(r.engine_error_at(identification.candidate) for r in identification.train_replays),
         "model": str(identification.model),
-        "versions": versions_of(PACKAGES),
+        "versions": versions_of(PACKAGES_OF_IDENTIFY),
     })  # fmt: skip
 
 
@@ -305,7 +305,7 @@ def convergence_remarks(identification: Identification) -> list[str]:
 
 def noise_remarks(identification: Identification) -> list[str]:
     replays = identification.train_replays
-    said = [noise_remark(r) for r in replays if len(replays) <= MOST_NAMED]
+    said = [noise_remark(r) for r in replays if len(replays) <= MOST_RECORDS_TOLD]
     for output in dict.fromkeys(r.record.output for r in replays if not said):
         of = [r.record for r in replays if r.record.output == output]
         values = [shown(record.noise.rms, record.unit)[0] for record in of]
@@ -322,8 +322,8 @@ def misfit_remarks(identification: Identification) -> list[str]:
              for r, level in pairs if level.from_residual]  # fmt: skip
     if not above:
         return []
-    text = ", ".join(f"{times:.3g} in {file}" for times, file in sorted(above, reverse=True)[:MOST_NAMED])
-    more = f" and {len(above) - MOST_NAMED} signals more" if len(above) > MOST_NAMED else ""
+    text = ", ".join(f"{times:.3g} in {file}" for times, file in sorted(above, reverse=True)[:MOST_RECORDS_TOLD])
+    more = f" and {len(above) - MOST_RECORDS_TOLD} signals more" if len(above) > MOST_RECORDS_TOLD else ""
     why = "the model, in which nothing is free, lacks something."
     if identification.space.free.any():
         why = (

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from armid.engine import simulate
 from armid.errors import ArmidError
-from armid.estimation.least_squares import LEAST, LeastSquaresProblem, WeightedRecords, fit, step_in_box
+from armid.estimation.least_squares import LEAST_DAMPING, LeastSquaresProblem, WeightedRecords, fit, step_in_box
 from armid.estimation.noise_model import Level, level_of, level_weights
 from armid.model import Array
 from armid.problem.problem import Replay, by_record
@@ -112,7 +112,7 @@ def information_of(
     if weighed is not None:
         covariance = np.where(known, determined @ (towards.T @ towards) @ determined, covariance)
     # what the box holds is held, and the others make up for that
-    step = step_in_box(own, towards.T @ residual, z, LEAST) - z
+    step = step_in_box(own, towards.T @ residual, z, LEAST_DAMPING) - z
     started = np.array([towards.T @ (rows * change) for change in start_changes(records, z)])
     started = started.reshape(len(started), len(z))
     covariance = covariance + determined @ (started.T @ started) @ determined
@@ -214,24 +214,24 @@ def collinear(information: Information) -> list[tuple[str, str, float]]:
 
 
 # chi2 of one degree of freedom at 95 %.
-THRESHOLD = NORMAL_95**2
+PROFILE_RISE = NORMAL_95**2
 # The ends of an interval by curvature and by profile disagree when they differ by more than this share of its half.
 AGREE = 0.15
 # A profile that falls by more than this below its minimum has found a better one.
 BETTER, MOST_RESTARTS = 0.01, 5
 # First step along a profile: so many standard deviations, at most this share of the range.
-FIRST_STEP, LONGEST_STEP = 0.5, 0.1
+FIRST_OF_PROFILE, LONGEST_OF_PROFILE = 0.5, 0.1
 # The walk ends where the rise reaches this many thresholds: what the figure shows.
 SHOWN_TO = 1.7
 # Wanted change of sqrt(rise) from point to point; steps grow and shrink by at most these factors.
-WANTED, GROWTH, SHRINKAGE = 0.45, 2.0, 0.4
-MOST_POINTS = 60
+WANTED, PROFILE_GROWTH, PROFILE_SHRINKAGE = 0.45, 2.0, 0.4
+MOST_OF_PROFILE = 60
 # So many points at least stand between the minimum and the crossing, so that the curve is not guessed.
-FEWEST = 4
+FEWEST_POINTS = 4
 # How closely a crossing is found, as a share of the step in which it lies.
 CLOSE = 1e-3
 # Relative change of chi2 at which a fit along a profile stops: far below what the threshold could see.
-TOLERANCE = 1e-7
+PROFILE_TOLERANCE = 1e-7
 
 
 @dataclass(frozen=True, eq=False)
@@ -323,7 +323,7 @@ def profile(records: LeastSquaresProblem, z: Array, i: int) -> Profile:
     held = held_fit(records, z, i, float(residual @ residual))
     points, ends, bounded = [Point(float(z[i]), 0.0, z)], [], []
     for sign, edge in ((-1.0, 0.0), (1.0, 1.0)):
-        side = walk(held, points[0], sign * min(FIRST_STEP * deviation, LONGEST_STEP))
+        side = walk(held, points[0], sign * min(FIRST_OF_PROFILE * deviation, LONGEST_OF_PROFILE))
         end, tried = crossing(held, side)
         bounded.append(end is not None)
         ends.append(edge if end is None else end)
@@ -349,7 +349,7 @@ def held_fit(records: LeastSquaresProblem, z: Array, i: int, least: float) -> He
         whole[i] = place
         part = replace(records, space=records.space.with_fixed(name, float(records.values(whole)[i])))
         try:
-            whole[others] = fit(part, whole[others], TOLERANCE) if others.any() else whole[others]
+            whole[others] = fit(part, whole[others], PROFILE_TOLERANCE) if others.any() else whole[others]
         except ArmidError:
             return Point(place, np.inf, whole)
         return Point(place, float(records.chi2(whole)[0]) - least, whole)
@@ -364,14 +364,14 @@ def walk(held: HeldFit, middle: Point, step: float) -> list[Point]:
     """
     points = [middle]
     edge = 1.0 if step > 0.0 else 0.0
-    while points[-1].place != edge and points[-1].rise < SHOWN_TO * THRESHOLD and len(points) < MOST_POINTS:
+    while points[-1].place != edge and points[-1].rise < SHOWN_TO * PROFILE_RISE and len(points) < MOST_OF_PROFILE:
         last = points[-1]
         place = float(np.clip(last.place + step, 0.0, 1.0))
         points.append(held(place, start_at(points, place)))
         change = abs(points[-1].height - last.height)
         if not np.isfinite(change):
             break
-        step *= float(np.clip(WANTED / max(change, 1e-9), SHRINKAGE, GROWTH))
+        step *= float(np.clip(WANTED / max(change, 1e-9), PROFILE_SHRINKAGE, PROFILE_GROWTH))
     return points
 
 
@@ -391,10 +391,10 @@ def crossing(held: HeldFit, side: list[Point]) -> tuple[float | None, list[Point
     """
     from scipy.optimize import brentq
 
-    above = next((k for k, p in enumerate(side) if p.rise >= THRESHOLD), None)
+    above = next((k for k, p in enumerate(side) if p.rise >= PROFILE_RISE), None)
     if above is None:
         return None, []
-    ends, tried, height = side[above - 1 : above + 1], [], float(np.sqrt(THRESHOLD))
+    ends, tried, height = side[above - 1 : above + 1], [], float(np.sqrt(PROFILE_RISE))
 
     def beyond(place: float) -> float:
         point = next((p for p in ends if p.place == place), None)
@@ -410,10 +410,10 @@ def between_points(held: HeldFit, points: list[Point], end: float) -> list[Point
     """Return further points between the minimum (the first) and the end of the interval, where few were tried there."""
     middle = points[0]
     inside = [p for p in points if abs(p.place - middle.place) < abs(end - middle.place)]
-    if len(inside) > FEWEST or end == middle.place:
+    if len(inside) > FEWEST_POINTS or end == middle.place:
         return []
     path = [middle]
-    for share in np.arange(1, FEWEST + 1) / (FEWEST + 1):
+    for share in np.arange(1, FEWEST_POINTS + 1) / (FEWEST_POINTS + 1):
         place = middle.place + float(share) * (end - middle.place)
         path.append(held(place, start_at(path, place)))
     return path[1:]

@@ -20,7 +20,7 @@ from armid.record import Piece, Record
 from armid.record.sensor import InputNoise, Mask, lengths_of_rest
 
 # Drawn errors, and their seed.
-DRAWS, SEED = 16, 1
+DRAWN_ERRORS, SEED_OF_ERRORS = 16, 1
 # Second differences that share a size, and steps towards these sizes.
 SHARING, ROUNDS = 9, 40
 # Weights of neighbours in first and second differences.
@@ -29,9 +29,9 @@ CHANGE, BEND = (-1.0, 1.0), (1.0, -2.0, 1.0)
 STRAIGHTEST = 1e-12
 # Cosines that are tried at once, and at most: fast errors move a machine least. Sum of squares, in units of the noise,
 # from which on samples see a signal.
-AT_ONCE, MOST_COSINES, SMALLEST = 16, 1024, 0.1
+AT_ONCE, MOST_COSINES, SMALLEST_SEEN = 16, 1024, 0.1
 # What rounding may add to a correlation.
-ROUNDING = 1e-9
+ROUNDING_OF_CORRELATION = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,10 +100,10 @@ def smoothed_bytes(column: bytes, noise: InputNoise, still: bytes) -> Smoothed:
     values, variance = np.frombuffer(column), noise.rms**2 + noise.step**2 / 12.0
     stays = np.frombuffer(still, dtype=np.bool_)
     steps = CHANGE, (stays[1:] & stays[:-1]) / (STRAIGHTEST * variance)
-    rng, bends = np.random.default_rng(SEED), np.full(values.size - 2, 1.0 / variance)
+    rng, bends = np.random.default_rng(SEED_OF_ERRORS), np.full(values.size - 2, 1.0 / variance)
     for _ in range(ROUNDS):
         now = Smoothed.of(values, variance, (BEND, bends), steps)
-        squares = np.diff(now.values, 2) ** 2 + np.mean(np.diff(now.errors(DRAWS, rng), 2, axis=0) ** 2, axis=1)
+        squares = np.diff(now.values, 2) ** 2 + np.mean(np.diff(now.errors(DRAWN_ERRORS, rng), 2, axis=0) ** 2, axis=1)
         bends = 1.0 / np.maximum(uniform_filter1d(squares, SHARING, mode="nearest"), STRAIGHTEST * variance)
     return Smoothed.of(values, variance, (BEND, bends), steps)
 
@@ -198,7 +198,7 @@ def answers_to_cosines(
                 # a simulation that diverges adds no noise
                 column.append(np.nan_to_num(r.seen(run)[0] - at_rest, posinf=0.0, neginf=0.0))
                 seen = max(seen, float(np.sum(column[-1] ** 2)) / size**2)
-        if seen < SMALLEST:
+        if seen < SMALLEST_SEEN:
             break
     return [np.array(column) for column in columns]
 
@@ -208,7 +208,7 @@ def root_of_correlation(known: Smoothed, n: int, step: float) -> Array:
     covariance = known.covariance(cosines(known.values.size, np.arange(n)), step)
     deviations = np.sqrt(np.diag(covariance))
     # the cosines of a straight input are collinear
-    return np.linalg.cholesky(covariance / np.outer(deviations, deviations) + ROUNDING * np.eye(n))
+    return np.linalg.cholesky(covariance / np.outer(deviations, deviations) + ROUNDING_OF_CORRELATION * np.eye(n))
 
 
 def cosines(n_samples: int, numbers: NDArray[np.int64]) -> Array:

@@ -149,7 +149,7 @@ def weighted_records(
 
 
 # Starts and parameters are fitted in turn, at most so often, until none moves by more than this share of its range.
-MOST_ROUNDS, SETTLED = 12, 1e-4
+MOST_ROUNDS, SETTLED_CHI2 = 12, 1e-4
 # How many candidates are spread over the box, and from how many of the best a fit starts.
 N_SPREAD, N_STARTS = 512, 4
 
@@ -227,7 +227,7 @@ def with_fitted_starts(replays: tuple[Replay, ...], space: Space) -> tuple[Repla
     for _ in range(MOST_ROUNDS):
         last, ready = x, with_starts(ready, space.complete(x[np.newaxis])[0])
         x = refine(ready, space, x)
-        if np.all(np.abs(x - last) <= SETTLED * (space.high - space.low)[space.free]):
+        if np.all(np.abs(x - last) <= SETTLED_CHI2 * (space.high - space.low)[space.free]):
             break
     return ready
 
@@ -251,14 +251,14 @@ def spread_starts(records: LeastSquaresProblem) -> list[Array]:
     return starts
 
 
-MOST_STEPS = 50
+MOST_ITERATIONS = 50
 # Dampings that are tried, as factors of the last best one; where no step helps, all are raised so much.
 LADDER, RAISED = (1e-3, 0.1, 1.0, 10.0), 1e3
-FIRST, LEAST, LARGEST = 1e-3, 1e-9, 1e6
+FIRST_DAMPING, LEAST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-9, 1e6
 # Two starts that have come this close to each other, in shares of the range, are one.
-SAME = 1e-3
+SAME_POINT = 1e-3
 # A path is given up that would not come to a limit with so many times the fall that its slopes promise.
-REACH = 10.0
+REACH_OF_PATH = 10.0
 
 
 @dataclass(eq=False)
@@ -268,13 +268,13 @@ class Descent:
     z: Array
     residual: Array
     chi2: float
-    damping: float = FIRST
+    damping: float = FIRST_DAMPING
     done: bool = False
 
 
 def descend(
     records: LeastSquaresProblem, starts: Sequence[Array], tolerance: float, central: bool = False,
-    limit: float = np.inf, most: int = MOST_STEPS,
+    limit: float = np.inf, most: int = MOST_ITERATIONS,
 ) -> Array:  # fmt: skip
     """Return the best of the least-squares estimates in the box from some starts that do not diverge, (n_free,).
 
@@ -292,7 +292,7 @@ def descend(
         advance(records, moving, tolerance, central, limit)
         apart: list[Descent] = []
         for path in sorted(paths, key=lambda p: p.chi2):
-            if all(np.max(np.abs(path.z - better.z), initial=0.0) > SAME for better in apart):
+            if all(np.max(np.abs(path.z - better.z), initial=0.0) > SAME_POINT for better in apart):
                 apart.append(path)
         paths = apart
     return min(paths, key=lambda p: p.chi2).z
@@ -305,10 +305,10 @@ def advance(
     left = [(p, j.T @ j, j.T @ p.residual) for p, j in zip(paths, slopes, strict=True)]
     for path, square, slope in left if not central else ():
         falls = promised_fall(square, slope, path.z)
-        path.done = falls <= tolerance * path.chi2 or path.chi2 - REACH * falls > limit
+        path.done = falls <= tolerance * path.chi2 or path.chi2 - REACH_OF_PATH * falls > limit
     left = [one for one in left if not one[0].done]
     while left:
-        dampings = [[max(f * p.damping, LEAST) for f in LADDER] for p, *_ in left]
+        dampings = [[max(f * p.damping, LEAST_DAMPING) for f in LADDER] for p, *_ in left]
         tried = [[step_in_box(square, slope, p.z, d) for d in ds]
                  for (p, square, slope), ds in zip(left, dampings, strict=True)]  # fmt: skip
         residuals = records.residuals(np.concatenate(tried)).reshape(len(left), len(LADDER), -1)
@@ -328,7 +328,7 @@ def taken(path: Descent, tried: Sequence[Array], residuals: Array, dampings: Seq
         return True
     moved = max(float(np.max(np.abs(z - path.z), initial=0.0)) for z in tried)
     path.damping *= RAISED
-    path.done = path.damping > LARGEST or moved < tolerance
+    path.done = path.damping > LARGEST_DAMPING or moved < tolerance
     return path.done
 
 
@@ -337,7 +337,7 @@ def promised_fall(square: Array, slope: Array, z: Array) -> float:
 
     square: J^T J, slope: J^T residual.
     """
-    return float(slope @ (step_in_box(square, slope, z, LEAST) - z))
+    return float(slope @ (step_in_box(square, slope, z, LEAST_DAMPING) - z))
 
 
 def step_in_box(square: Array, slope: Array, z: Array, damping: float, n_boxed: int | None = None) -> Array:

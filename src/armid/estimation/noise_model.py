@@ -25,12 +25,12 @@ from armid.record.record import NOISE_FREE
 from armid.record.sensor import FEWEST_REST_SAMPLES, changing, correlation_sum, difference_rms, memory_of, new_share
 
 T = TypeVar("T")
-MOST_TERMS, FEWEST_FOR_COLOUR, MOST_LAGS = 8, 50, 500
+MOST_TERMS, FEWEST_FOR_COLOUR, MOST_LAGS_OF_NOISE = 8, 50, 500
 # A mean square of the residual above this many times that of the noise is not noise; below this many errors of the
 # engine it is the engine's.
 MISFIT, ENGINE_ERRORS = 2.0, 3.0
 # Chance below which a residual is not noise; independent samples in the blocks whose means are looked at.
-CHANCE, BLOCKS = 1e-3, (8, 32)
+CHANCE_OF_COLOUR, BLOCKS = 1e-3, (8, 32)
 # What is assumed for a record without noise, as a share of its rms speed.
 ASSUMED = 1e-3
 
@@ -196,7 +196,7 @@ def coloured_level(rests: Sequence[Array], rms: float, n: int) -> NoiseModel:
         return white_level(rms, n)
     terms, variance = fits[order]
     correlation = list(covariance[: order + 1] / covariance[0])
-    while len(correlation) <= MOST_LAGS:
+    while len(correlation) <= MOST_LAGS_OF_NOISE:
         correlation.append(float(terms @ np.array(correlation[: -order - 1 : -1])))
     rho = np.array(correlation[1:])
     slow, power = n / max(1.0 + 2.0 * rho.sum(), 1.0), n / (1.0 + 2.0 * float(rho @ rho))
@@ -268,7 +268,7 @@ def is_noise(residual: Array, noise: Noise) -> bool:
             # of white noise nothing else has to be known
             tests.append((spread, blocks.size, residual.size if share == 1.0 else known))
     # scipy.stats would take longer to load than an identification
-    return all(float(fdtrc(above, below, value)) > CHANCE for value, above, below in tests)
+    return all(float(fdtrc(above, below, value)) > CHANCE_OF_COLOUR for value, above, below in tests)
 
 
 def levels_of(replays: Sequence[Replay], space: Space, x: Array, noise: float | None = None) -> tuple[Level, ...]:

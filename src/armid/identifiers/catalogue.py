@@ -22,7 +22,7 @@ from armid.identifiers.search import Dropped, SearchAlgorithm, SearchTask, Told,
 from armid.model import Array, Catalogue
 
 PREFIX = "multistart:"
-SHARE = Option("of the budget", least=SMALLEST_SHARE, most=1.0)
+SHARE_OF_BUDGET = Option("of the budget", least=SMALLEST_SHARE, most=1.0)
 
 
 def chain_of(phases: Sequence[Identifier]) -> Identifier:
@@ -88,7 +88,7 @@ def shares_of(given: Any, n_phases: int) -> list[float]:
         shares = [0.5**phase for phase in range(1, n_phases)]
     else:
         parts = given.split(":") if isinstance(given, str) else given if isinstance(given, list | tuple) else [given]
-        shares = [checked("share", as_number(part), about=SHARE) for part in parts]
+        shares = [checked("share", as_number(part), about=SHARE_OF_BUDGET) for part in parts]
     if len(shares) != n_phases - 1 or sum(shares) >= 1.0:
         raise ArmidError(f"share is {given!r}, expected {n_phases - 1} shares of the budget with a sum below 1, "
                          "one for each phase but the last, such as 0.5 or 0.5:0.3")  # fmt: skip

@@ -27,7 +27,7 @@ NOT_OPTIONS = (*OF_SETUP, "budget", "self")
 # A share below the rounding of 1 changes nothing.
 SMALLEST_SHARE = 1e-15
 # Larger populations do not fit into memory, larger budgets and schedules into no lifetime.
-LARGEST_POPULATION, LARGEST_COUNT = 10**6, 10**15
+LARGEST_POPULATION, LARGEST_WHOLE = 10**6, 10**15
 RANGE = "share of the range"
 
 
@@ -48,7 +48,7 @@ class Option:
     tune: tuple[float, float] | None = None
 
 
-NUMBER = Option("")
+NUMBER_OPTION = Option("")
 
 
 def option(default: Any, meaning: str, unit: str = "1", **limits: Any) -> Any:
@@ -95,7 +95,7 @@ def kind_of(option: Any) -> type:
     return next(kind for kind in (bool, int, float, str) if kind in kinds)
 
 
-def checked(name: str, value: Any, kind: type = float, about: Option = NUMBER) -> Any:
+def checked(name: str, value: Any, kind: type = float, about: Option = NUMBER_OPTION) -> Any:
     """Return a value as its kind; refuse with ArmidError another kind, or a number outside the limits."""
     if isinstance(value, str) and value in about.known:
         return value
@@ -114,7 +114,7 @@ def checked(name: str, value: Any, kind: type = float, about: Option = NUMBER) -
 
 
 def checked_count(name: str, value: Any) -> int:
-    return int(checked(name, value, int, Option("", least=1, most=LARGEST_COUNT)))
+    return int(checked(name, value, int, Option("", least=1, most=LARGEST_WHOLE)))
 
 
 @dataclass(frozen=True)

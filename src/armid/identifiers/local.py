@@ -7,11 +7,19 @@ import nlopt
 import numpy as np
 
 from armid.identifiers.identifier import RANGE, declared, option, share
-from armid.identifiers.search import SEEDS, Calls, Height, NoFitnessError, SearchOptions, SearchTask, local_search
+from armid.identifiers.search import (
+    LARGEST_SEED,
+    Calls,
+    Height,
+    NoFitnessError,
+    SearchOptions,
+    SearchTask,
+    local_search,
+)
 from armid.model import Array
 
 FORWARD, CENTRAL = "forward", "central"
-KINDS = (FORWARD, CENTRAL)
+DIFFERENCES = (FORWARD, CENTRAL)
 # The budget ends a search, never this.
 MOST_CALLS = 10**9
 
@@ -24,7 +32,7 @@ class TrustRegion(SearchOptions):
     doi:10.1137/S1064827595289108, as scipy.optimize.least_squares has it.
     """
 
-    differences: str = option(FORWARD, "forward or central", "", known=KINDS)
+    differences: str = option(FORWARD, "forward or central", "", known=DIFFERENCES)
     step: float = share(1e-6, "how far a perturbed candidate is")
     tolerance: float = option(1e-12, "it ends when a step changes no parameter, nor the sum of squares, by more", RANGE,
                               least=1e-15, expected="a number of at least 1e-15")  # fmt: skip
@@ -140,7 +148,7 @@ class ByValues(SearchOptions):
 
     def search(self, task: SearchTask) -> None:
         """Descend from the task's start, or from random ones until one has a fitness."""
-        seed = int(task.random.integers(1, SEEDS))
+        seed = int(task.random.integers(1, LARGEST_SEED))
         local_search(task, lambda start: self.descend(task, seed, start))
 
     def descend(self, task: SearchTask, seed: int, start: Array) -> None:
@@ -178,7 +186,7 @@ class ByValues(SearchOptions):
 class ByGradient(ByValues):
     """Minimise in the unit cube by one of NLopt's algorithms that ask for derivatives."""
 
-    differences: str = option(CENTRAL, "forward or central", "", known=KINDS)
+    differences: str = option(CENTRAL, "forward or central", "", known=DIFFERENCES)
     step: float = share(1e-6, "how far a perturbed candidate is")
 
     def beside(self, here: Array) -> Stencil:

@@ -17,7 +17,7 @@ from pymoo.core.algorithm import Algorithm
 
 from armid.errors import ArmidError
 from armid.identifiers.identifier import Identifier, accepts, declared, option, refuse_unknown
-from armid.identifiers.search import SEEDS, Asker, Calls, SearchAlgorithm, SearchOptions, SearchTask
+from armid.identifiers.search import LARGEST_SEED, Asker, Calls, SearchAlgorithm, SearchOptions, SearchTask
 from armid.model import Array
 from armid.problem.meter import PENALTY
 
@@ -168,7 +168,7 @@ class Lshade(Foreign):
         n_candidates = max(4, min(round(self.per_parameter * low.size), budget // 10))
         options = {"population_size": n_candidates, "memory_size": self.memory, "x_tol": 0.0}
         box = list(zip(low.tolist(), high.tolist(), strict=True))
-        LSHADE(value, box, None, budget, None, int(random.integers(1, SEEDS)), options).optimize()
+        LSHADE(value, box, None, budget, None, int(random.integers(1, LARGEST_SEED)), options).optimize()
 
 
 @dataclass(frozen=True)
@@ -188,7 +188,7 @@ class Ngopt(Foreign):
 
         # nevergrad 1.0.12 makes a number of an array of one, which numpy 2.4 refuses
         vars(metamodel).setdefault("float", lambda number: float(np.asarray(number).item()))
-        seed, point = int(random.integers(1, SEEDS)), ng.p.Array(shape=low.shape, lower=0.0, upper=1.0)
+        seed, point = int(random.integers(1, LARGEST_SEED)), ng.p.Array(shape=low.shape, lower=0.0, upper=1.0)
         point.random_state = np.random.RandomState(seed)
         # some of its methods draw from the global generators all the same
         state, by_numpy, before = python_random.getstate(), np.random.get_state(), set(threading.enumerate())
@@ -228,7 +228,7 @@ class Tpe(Foreign):
 
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
-            seed = int(random.integers(1, SEEDS))
+            seed = int(random.integers(1, LARGEST_SEED))
             sampler = optuna.samplers.TPESampler(seed=seed, multivariate=True, n_startup_trials=self.n_first)
         optuna.logging.set_verbosity(optuna.logging.WARNING)
         study = optuna.create_study(sampler=sampler)

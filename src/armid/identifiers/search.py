@@ -158,7 +158,7 @@ def bounds_of(problem: Problem) -> tuple[Array, Array]:
     return problem.xl, problem.xu
 
 
-SEEDS = 2**31 - 1
+LARGEST_SEED = 2**31 - 1
 PLAIN = ["F", "G", "H"]
 
 
@@ -292,14 +292,14 @@ def carry_out(algorithm: Algorithm, task: SearchTask, seed: int | None = None) -
     """Search as a fresh algorithm does, from the task's start if it has one; seed: of the run, None in a part of it."""
     if isinstance(algorithm, SearchAlgorithm):
         is_own = algorithm.is_seeded and seed is None
-        random = np.random.default_rng(int(task.random.integers(1, SEEDS))) if is_own else task.random
+        random = np.random.default_rng(int(task.random.integers(1, LARGEST_SEED))) if is_own else task.random
         algorithm.search(replace(task, random=random, budget=algorithm.budget))
         return
     if isinstance(algorithm, LocalSearch) and task.start is not None:
         algorithm.initialization = Initialization(task.start[np.newaxis])
     elif task.start is not None:
         algorithm.x0 = task.start.copy()
-    seed = int(task.random.integers(1, SEEDS)) if seed is None else seed
+    seed = int(task.random.integers(1, LARGEST_SEED)) if seed is None else seed
     algorithm.setup(task.problem, termination=NoTermination(), seed=seed)
     while algorithm.has_next():
         asked = algorithm.ask()

@@ -11,7 +11,7 @@ from armid.model import Effect, Model, Parameter
 # What the names of constants that are known roughly begin with, which are looked for as effects are.
 ERROR_OF, CONSTANT = "error_of_", "constant:"
 # Fewer candidates than these are compiled together.
-APART = 12
+FEWEST_IN_BUNDLES = 12
 # What the names of test signals begin with.
 PROBE = "probe_"
 
@@ -85,7 +85,7 @@ def bundled(declared: Model, effects: Mapping[EffectKey, Effect]) -> tuple[Activ
     pairs = sorted(((key, compiled(key, effect)) for key, effect in effects.items()), key=lambda pair: pair[1].name)
     plain = [pair for pair in pairs if not (pair[1].states or pair[1].delays)]
     others = [pair for pair in pairs if pair not in plain]
-    first = grouped(declared, (declared, ()), plain) if len(pairs) >= APART else []
+    first = grouped(declared, (declared, ()), plain) if len(pairs) >= FEWEST_IN_BUNDLES else []
     rest = grouped(declared, first[0] if first else (declared, ()), others if first else pairs)
     return tuple(keys for _, keys in [*first, *rest])
 

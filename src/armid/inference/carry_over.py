@@ -25,7 +25,7 @@ from armid.model import Array
 from armid.units import shown
 
 # Parts that are left out in turn; models of each number of effects that are compared.
-MOST_PARTS, MOST_OF_SIZE = 5, 3
+PARTS_LEFT_OUT, MOST_OF_SIZE = 5, 3
 
 
 @dataclass(frozen=True)
@@ -184,9 +184,9 @@ def parts_of(data: WhitenedData) -> list[NDArray[np.int64]]:
     distinct = list(dict.fromkeys(names))
     if len(distinct) > 1:
         # of many manoeuvres several are left out together, spread over the campaign
-        groups = [distinct[i::MOST_PARTS] for i in range(min(MOST_PARTS, len(distinct)))]
+        groups = [distinct[i::PARTS_LEFT_OUT] for i in range(min(PARTS_LEFT_OUT, len(distinct)))]
         return [np.concatenate([x for x, n in zip(indices, names, strict=True) if n in group]) for group in groups]
-    blocks = [np.array_split(x, MOST_PARTS) for x in indices]
+    blocks = [np.array_split(x, PARTS_LEFT_OUT) for x in indices]
     return [np.concatenate(block) for block in zip(*blocks, strict=True)]
 
 

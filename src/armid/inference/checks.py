@@ -27,9 +27,9 @@ LAGS, N_BINS = 40, 12
 BANDS_HZ = (0.0, 5.0, 12.0, 25.0, 50.0, 100.0, 250.0, np.inf)
 # Neighbouring ordinates of a tapered periodogram tell partly the same; a band needs so many of the rest.
 INDEPENDENT, FEWEST_ORDINATES = 0.5, 4
-# Frequencies of mains and number of their harmonics. LINE: power of a line of a rest over that of its neighbours;
-# BESIDE: distance of these, in widths 1/T of the rest.
-MAINS_HZ, HARMONICS, LINE, BESIDE = (50.0, 60.0), 5, 4.0, 3.0
+# Frequencies of mains and number of their harmonics. LINE_OF_MAINS: power of a line of a rest over that of its
+# neighbours; BESIDE_LINE: distance of these, in widths 1/T of the rest.
+MAINS_HZ, HARMONICS, LINE_OF_MAINS, BESIDE_LINE = (50.0, 60.0), 5, 4.0, 3.0
 # So small a p-value stays significant whatever the number of tests.
 CERTAIN = 1e-7
 # Products of columns whose share of the largest is below this are rounding.
@@ -37,7 +37,7 @@ DEPENDENT = 1e-11
 # Share of the samples of a record over which lines are drawn where they are no data.
 MOST_BRIDGED = 0.05
 # Below this share of the largest speed a machine is at rest; below this share of the largest change its speed is even.
-STILL, EVEN = 0.02, 0.1
+STILL, EVEN_SPEED = 0.02, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +168,7 @@ def motion_phases(speeds: Sequence[Array]) -> dict[str, NDArray[np.bool_]]:
     """
     speed, change = np.concatenate(speeds), np.concatenate([np.gradient(v) for v in speeds])
     still = speed <= STILL * speed.max()
-    even = ~still & (np.abs(change) <= EVEN * np.abs(change).max())
+    even = ~still & (np.abs(change) <= EVEN_SPEED * np.abs(change).max())
     return {"at rest": still, "at an even speed": even, "while it speeds up": ~still & ~even & (change > 0.0),
             "while it slows down": ~still & ~even & (change < 0.0)}  # fmt: skip
 
@@ -440,7 +440,7 @@ def mains_hum(seen: Residuals) -> list[tuple[float, float]]:
     rests = [(r.rest - np.mean(r.rest), r.spacing) for r in seen.data.each if r.noise.source == "rest"]
     if not rests:
         return []
-    width = BESIDE / min(len(x) * step for x, step in rests)
+    width = BESIDE_LINE / min(len(x) * step for x, step in rests)
 
     def power(frequency: float) -> float:
         waves = [
@@ -450,7 +450,9 @@ def mains_hum(seen: Residuals) -> list[tuple[float, float]]:
 
     highest = min(0.5 / step for _, step in rests) - width
     lines = (f * k for f in MAINS_HZ for k in range(1, HARMONICS + 1) if width < f * k < highest)
-    return [(f - width, f + width) for f in lines if 2.0 * power(f) > LINE * (power(f - width) + power(f + width))]
+    return [
+        (f - width, f + width) for f in lines if 2.0 * power(f) > LINE_OF_MAINS * (power(f - width) + power(f + width))
+    ]
 
 
 def without_lines(signal: Array, frequencies: Sequence[float], interval: float) -> Array:

@@ -29,9 +29,9 @@ from armid.inference.model import Fit
 from armid.model import Array
 
 # Prior standard deviations of a strength, as shares of its declared range: its size is known to orders of magnitude.
-SCALES = np.array([0.03, 0.1, 0.3, 1.0])
+SCALES_OF_STRENGTH = np.array([0.03, 0.1, 0.3, 1.0])
 # Fewest independent samples of a residual that is more than noise.
-FEWEST = 10.0
+FEWEST_OF_RESIDUAL = 10.0
 # Largest exponent: exp(500) is still far from overflow.
 LARGEST_EXPONENT = 500.0
 LOG_2, LOG_2PI = float(np.log(2.0)), float(np.log(2.0 * np.pi))
@@ -69,7 +69,7 @@ def scale_of(best: Fit) -> Scale:
     Noise: each independent sample counts. More than noise: what is left is the model's error, of unknown size.
     """
     data, n = best.records.data, float(np.count_nonzero(best.records.data.sound))
-    independent = float(np.clip(best.independent, FEWEST, n))
+    independent = float(np.clip(best.independent, FEWEST_OF_RESIDUAL, n))
     if not is_significant(best):
         # A short rest tells the colour of the noise roughly, so that what is whitened may still be correlated.
         return Scale(independent, independent / n, data.n_noise(otherwise=n))
@@ -307,8 +307,8 @@ def log_strength(about: Expansion, key: EffectKey) -> float:
         return 0.0
     size = about.sizes[places]
     covariance = about.covariance[np.ix_(places, places)] / np.outer(size, size)
-    densities = [log_normal(np.array(shares), covariance + s * s * np.eye(len(places))) for s in SCALES]
-    return float(density + logsumexp(densities) - np.log(len(SCALES)) - np.sum(np.log(size)))
+    densities = [log_normal(np.array(shares), covariance + s * s * np.eye(len(places))) for s in SCALES_OF_STRENGTH]
+    return float(density + logsumexp(densities) - np.log(len(SCALES_OF_STRENGTH)) - np.sum(np.log(size)))
 
 
 def doubts_of(fit: Fit, library: Library) -> Array:

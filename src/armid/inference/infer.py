@@ -25,27 +25,27 @@ from armid.inference.hypothesis import Hypotheses, Hypothesis
 from armid.inference.kinds import effects
 from armid.inference.library import Library, library_of
 from armid.inference.model import ROUGHLY, Fit, accurate, fit_from, start_of
-from armid.inference.posterior import CONSTANTS, Posterior, posterior, spread
+from armid.inference.posterior import CONSTANTS_TEXT, Posterior, posterior, spread
 from armid.inference.search import Exploration, explore, without_denied
 from armid.inference.whitening import WhiteRecords, whitened, with_answers
 from armid.model import EFFECTS, Array, Effect, Model
 from armid.model.effects.sensor import sensor_effects
 from armid.problem.space import Space
 from armid.record import Campaign
-from armid.report.document import inputs_act
+from armid.report.document import may_be_inputs
 
 # By which factor strengths that scale with the machine may exceed their declared range.
-REACH = 16.0
+REACH_OF_STRENGTHS = 16.0
 # A declared effort within this factor of the largest one at the declared fit stays: a scale is an order of magnitude.
-ALIKE = 2.0
+SAME_ORDER = 2.0
 # How much wider a range becomes whose end holds a strength, and how often.
-WIDER, MOST_WIDENED = 8.0, 4
+WIDER_RANGE, MOST_WIDENED = 8.0, 4
 # Share of what a model leaves, below which noise of the inputs is a trifle: a millionth of its square.
 TRIFLE = 1e-3
 # Shares of each record to which a first estimate is carried on.
 GROWING = (0.125, 0.25, 0.5, 0.75)
 # Names in the sentence that leads, and constants that are named as a cause of an interval's width.
-MOST_TOLD, MOST_CONSTANTS = 5, 3
+MOST_LEADING, MOST_CONSTANTS = 5, 3
 
 
 @dataclass(frozen=True)
@@ -156,8 +156,10 @@ class Inference:
         constants = [f.unknown.name.removeprefix(NAMED) for f in self.best.others if f.unknown.name.startswith(NAMED)]
         which = f" ({', '.join(constants)})" if 0 < len(constants) <= MOST_CONSTANTS else ""
         parts = ["where something unknown acts"] if self.posterior.best_is_unknown else []
-        parts += [f"{CONSTANTS}{which}"] if constants else [f"size of {sizes[0]}"] if sizes else []
-        beside = ", and ".join(parts) or (CONSTANTS if self.exploration.library.tolerances else "starts of the records")
+        parts += [f"{CONSTANTS_TEXT}{which}"] if constants else [f"size of {sizes[0]}"] if sizes else []
+        beside = ", and ".join(parts) or (
+            CONSTANTS_TEXT if self.exploration.library.tolerances else "starts of the records"
+        )
         for name, one in self.of_fit(self.in_force).items():
             if name in self.posterior.parameters:
                 causes = tuple(self.posterior.causes(name, float(of_noise[name]), beside))
@@ -196,10 +198,10 @@ def in_box(space: Space, name: str, low: float, high: float) -> tuple[float, flo
 def sentence_of(chances: Mapping[str, Any]) -> str:
     """Return probabilities in one line: the effects, faults of records, nothing, and what nobody knows."""
     named = [f"{name} {p:.2f}" for name, p in chances["effects"].items()]
-    left = len(named) - MOST_TOLD
+    left = len(named) - MOST_LEADING
     more = [f"{left} other{'s' if left > 1 else ''}"] if left > 0 else []
     faults = [f"{name} {p:.2f}" for kind in ("records", "drifts") for name, p in chances[kind].items()]
-    return "; ".join([*named[:MOST_TOLD], *more, *faults[:MOST_TOLD], f"nothing missing {chances['nothing']:.2f}",
+    return "; ".join([*named[:MOST_LEADING], *more, *faults[:MOST_LEADING], f"nothing missing {chances['nothing']:.2f}",
                       f"something that the library does not hold {chances['unknown']:.2f}"])  # fmt: skip
 
 
@@ -269,7 +271,7 @@ def prepared(
     library = library_of(model, candidates, data, campaign.parameters, bounds or {}, fixed or {}, threads, told, within)
     chances = {**campaign.chances, **(priors or {})}
     known = {name: (one.mean, one.sd) for name, one in campaign.known.items()}
-    library = replace(library, reach=REACH, priors=chances, known=known)
+    library = replace(library, reach=REACH_OF_STRENGTHS, priors=chances, known=known)
     problem = library.problem(())
     library = library.about(with_fitted_starts(problem.replays, problem.space), library.misfit)
     library, declared = with_input_noise(*with_noise(*with_scales(library)))
@@ -295,15 +297,15 @@ def infer(library: Library, declared: Fit) -> Inference:
     if fit.active and inference.posterior.probability("unknown") >= MENTIONED:
         # the declared model may answer to its inputs quite otherwise
         again = with_measured_inputs(exact, fit)
-        if shows_inputs(again, fit) and matters(again, fit):
+        if may_be_all(again, fit):
             library.say("the same with the noise of the inputs as the best model answers to it")
             return inferred(again, declared_again(again, declared))
     return inference
 
 
-def shows_inputs(library: Library, fit: Fit) -> bool:
-    """Tell whether noise of the inputs moves an output by more than its sensor's, and shows in what a model leaves."""
-    return any(inputs_act(level.rms, level.moved, left) for level, left in moved_and_left(library, fit))
+def may_be_all(library: Library, fit: Fit) -> bool:
+    """Tell whether noise of the inputs may be all of what a model leaves of a signal."""
+    return any(may_be_inputs(level.rms, level.moved, left) for level, left in moved_and_left(library, fit))
 
 
 def matters(library: Library, fit: Fit) -> bool:
@@ -367,7 +369,10 @@ def with_scales(library: Library) -> tuple[Library, Fit]:
         if not own:
             break
         space = fit.records.space
-        wider = {n: (WIDER * float(space.low[space.index(n)]), WIDER * float(space.high[space.index(n)])) for n in own}
+        wider = {
+            n: (WIDER_RANGE * float(space.low[space.index(n)]), WIDER_RANGE * float(space.high[space.index(n)]))
+            for n in own
+        }
         library = replace(library, widened={**library.widened, **wider}, _problems={})
         fit = declared_fit(library)
     return library, fit
@@ -417,7 +422,7 @@ def rescaled(library: Library, declared: Fit) -> Library:
         for piece, schedule in zip(replay.pieces, (c.schedule for c in replay.calibrations), strict=True):
             effort = along(model, piece.manoeuvre, declared.candidate, schedule, ["drive_effort"])
             largest = max(largest, float(np.nanmax(np.abs(effort["drive_effort"]), initial=0.0)))
-    if not np.isfinite(largest) or largest <= 0.0 or 1.0 / ALIKE < largest / plant.scales.effort < ALIKE:
+    if not np.isfinite(largest) or largest <= 0.0 or 1.0 / SAME_ORDER < largest / plant.scales.effort < SAME_ORDER:
         return library
     scaled = replace(plant, scales=replace(plant.scales, effort=largest))
     own = {n: (p.low, p.high) for n, p in library.declared.parameters.items()

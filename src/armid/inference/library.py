@@ -16,7 +16,7 @@ from typing import TypeVar
 import numpy as np
 
 from armid.engine import STANDARD, Calibration, Schedule, Simulation, accuracy_against, probes, simulate
-from armid.engine.calibrate import ALLOWED, MARGIN, difference, switch_weights
+from armid.engine.calibrate import ALLOWED, MARGIN_OF_STEPS, difference, switch_weights
 from armid.estimation.least_squares import side_by_side
 from armid.inference.candidates import (
     ERROR_OF,
@@ -153,7 +153,7 @@ class Library:
     ) -> tuple[Replay, ...]:  # fmt: skip
         """Return the train records ready to be simulated, as finely as a residual so many times the noise asks for."""
         noise = [level.innovation for level in self.data.levels]
-        hidden = HIDDEN * misfit**2 / len(self.data.sound)
+        hidden = HIDDEN_ERROR * misfit**2 / len(self.data.sound)
         return calibrated_replays(self.data.records, model, space, near, on_one, noise, hidden)
 
     def compiled_model(self, active: Active) -> Model:
@@ -304,15 +304,15 @@ def library_of(
 
 
 # Candidates of one calibration, the factor of a known value within which they lie, and the schedules that are tried.
-N_PROBES, NEAR, SUBSTEPS = 8, 2.0, (1, 2, 4, 8)
+N_PROBES_ABOUT, NEAR_VALUE, SUBSTEPS_TRIED = 8, 2.0, (1, 2, 4, 8)
 # From so many steps between samples on it is tried whether rough samples alone ask for them, and which these are: those
 # in which a step is uncertain by such a share of the range of a state.
-FEWEST_SPARED, SHARES = 4, (1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
+FEWEST_SPARED, SHARES_OF_ERROR = 4, (1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
 # Strengths that are tried, as shares of the way from the null to a bound; shapes: points along each of 1, 2, 3 ranges.
-STRENGTHS, STRENGTHS_OF_SHAPES = (0.03, 0.1, 0.3, 1.0), (0.05, 0.4)
+STRENGTHS_TRIED, STRENGTHS_OF_SHAPES = (0.03, 0.1, 0.3, 1.0), (0.05, 0.4)
 SHAPES = {0: (), 1: (8,), 2: (7, 3), 3: (5, 3, 2)}
 # What the engine's error may add to chi2 of a residual that is noise, and in proportion to one that is more.
-HIDDEN = 0.1
+HIDDEN_ERROR = 0.1
 
 
 def calibrated_replays(
@@ -333,16 +333,16 @@ def calibrated_replays(
     low, high = space.low[space.free].copy(), space.high[space.free].copy()
     for i, name in enumerate(space.free_names):
         if name in near:
-            ends = sorted((near[name] / NEAR, near[name] * NEAR))
+            ends = sorted((near[name] / NEAR_VALUE, near[name] * NEAR_VALUE))
             low[i], high[i] = max(low[i], ends[0]), min(high[i], ends[1])
-    rows = probes(low, np.maximum(high, low), N_PROBES)
+    rows = probes(low, np.maximum(high, low), N_PROBES_ABOUT)
     # What is tried first is weak, and a short lag may ask for finer steps than all that the box is likely to hold.
     nulls = {i: null for i, n in enumerate(space.free_names)
              if n not in near and (null := model.parameters[n].null) is not None}  # fmt: skip
     if nulls:
         weak = 0.5 * (low + high)
         for i, null in nulls.items():
-            weak[i] = null + STRENGTHS[0] * max(low[i] - null, high[i] - null, key=abs)
+            weak[i] = null + STRENGTHS_TRIED[0] * max(low[i] - null, high[i] - null, key=abs)
         rows = np.vstack([rows, weak])
     spread = space.complete(rows)
     outputs = [o.name for o in model.plant.outputs]
@@ -394,12 +394,12 @@ def quickly_calibrated(
         both = ~(run.failed | finer.failed)
         square = np.mean((run.outputs[:, both] - finer.outputs[:, both]) ** 2, axis=-1)
         largest = np.sqrt(np.max(square, axis=1, initial=0.0)) * 16 / 15
-        is_hidden = rms is not None and bool((largest <= MARGIN * rms).all())
-        good = (error <= MARGIN * allowed or is_hidden) and not finer.failed.all()
+        is_hidden = rms is not None and bool((largest <= MARGIN_OF_STEPS * rms).all())
+        good = (error <= MARGIN_OF_STEPS * allowed or is_hidden) and not finer.failed.all()
         return error, is_hidden, good and not (run.failed & ~finer.failed).any()
 
-    runs = {n: simulate(model, manoeuvre, spread, Schedule(n)) for n in SUBSTEPS[:2]}
-    for n in SUBSTEPS:
+    runs = {n: simulate(model, manoeuvre, spread, Schedule(n)) for n in SUBSTEPS_TRIED[:2]}
+    for n in SUBSTEPS_TRIED:
         runs[2 * n] = runs.get(2 * n) or simulate(model, manoeuvre, spread, Schedule(2 * n))
         error, is_hidden, good = judged(runs[n], runs[2 * n])
         if good:
@@ -408,9 +408,9 @@ def quickly_calibrated(
     if good and n >= FEWEST_SPARED:
         # Where steps are fine for the sake of a few samples (friction as it changes its sign), only these need be cut.
         sound = spread[~runs[2 * n].failed]
-        states = simulate(model, manoeuvre, sound, Schedule(SUBSTEPS[-1]), states=True).states
+        states = simulate(model, manoeuvre, sound, Schedule(SUBSTEPS_TRIED[-1]), states=True).states
         ranges = np.array([np.max(np.ptp(state, axis=-1)) for state in states.values()])
-        for share in SHARES:
+        for share in SHARES_OF_ERROR:
             tried = replace(schedule, rough=np.where(ranges > 0.0, share * ranges, np.inf))
             run = simulate(model, manoeuvre, spread, tried)
             judgement = judged(run, runs[2 * n])
@@ -458,7 +458,7 @@ def activation_grid(
     for names, side, shape in product(chosen, (1, 0), points):
         full = {n: float(bound[n][side]) if n in names else null[n] for n in null}
         if all(full[n] != null[n] for n in names):
-            shares = STRENGTHS_OF_SHAPES if shapes else STRENGTHS
+            shares = STRENGTHS_OF_SHAPES if shapes else STRENGTHS_TRIED
             activations += [Activation(shape | full, null, share) for share in shares]
     return activations, len(points)
 

@@ -25,7 +25,7 @@ MOST_KNOTS = 600
 KNOT_S, MOST_KNOTS_OF_A_PIECE = 0.02, 240
 # A test signal may move the output by this share of the speed scale: far above rounding, hardly beyond linearity.
 MOVED = 1e-4
-SIZES = 10.0 ** np.arange(-12.0, 10.0)
+SIZES_OF_TEST = 10.0 ** np.arange(-12.0, 10.0)
 # Ports whose signals correlate above this are one; variables whose ranks do are one.
 SAME_PORT, SAME_VARIABLE = 0.9999, 0.999
 
@@ -198,11 +198,11 @@ class Probe:
     def fitting_size(self, segment: Segment) -> float | None:
         """Return the largest power of ten whose effect on the output is still small, None where none has any."""
         knots = segment.knots
-        run = self.run(segment, SIZES, float(knots[len(knots) // 3]), float(knots[-1] - knots[0]) / 4)
+        run = self.run(segment, SIZES_OF_TEST, float(knots[len(knots) // 3]), float(knots[-1] - knots[0]) / 4)
         signals, size = run.joint(self.model.plant.sizes), self.model.plant.sizes[0]
         moved = np.abs(signals[1:] - signals[0]).max(axis=1)
         small = np.isfinite(moved) & (moved <= MOVED * size) & (moved > 0.0)
-        return float(SIZES[small][-1]) if small.any() else None
+        return float(SIZES_OF_TEST[small][-1]) if small.any() else None
 
     def gain(self, segment: Segment, size: float) -> Array:
         """Return d signal / d missing signal at each knot, over the levels, (n_samples, n_knots)."""
@@ -213,11 +213,11 @@ class Probe:
         return np.concatenate([(output[1:] - output[0]).T / size / level for output, level in seen])
 
 
-STRENGTHS = 10.0 ** np.arange(-8.0, 6.0, 0.5)
+STRENGTHS_OF_SIGNAL = 10.0 ** np.arange(-8.0, 6.0, 0.5)
 # Added to the squared second differences (up to 16): keeps straight lines from being free.
 LITTLE = 1e-6
 # Smaller eigenvalues of the normal equations, relative to the largest, are rounding.
-ROUNDING = 1e-13
+ROUNDING_OF_SIGNAL = 1e-13
 
 
 def missing_signal(segments: Sequence[Segment], port: str) -> MissingSignal:
@@ -251,17 +251,17 @@ def smoothest(normal: Array, slope: Array, rough: Array, total: float, n: int) -
     lower = np.linalg.cholesky(rough.T @ rough + LITTLE * np.eye(rough.shape[1]))
     inner = np.linalg.solve(lower, np.linalg.solve(lower, normal).T)
     values, vectors = np.linalg.eigh(0.5 * (inner + inner.T))
-    seen = values > ROUNDING * values[-1]
+    seen = values > ROUNDING_OF_SIGNAL * values[-1]
     values, vectors = values[seen], vectors[:, seen]
     along = vectors.T @ np.linalg.solve(lower, slope)
     squares = along**2 / values
     outside = max(total - float(squares.sum()), 0.0)
     scores = []
-    for strength in STRENGTHS:
+    for strength in STRENGTHS_OF_SIGNAL:
         kept = values / (values + strength)
         rest = outside + float(np.sum((1.0 - kept) ** 2 * squares))
         scores.append(n * rest / (n - min(float(kept.sum()), 0.9 * n)) ** 2)
-    strength = float(STRENGTHS[int(np.argmin(scores))])
+    strength = float(STRENGTHS_OF_SIGNAL[int(np.argmin(scores))])
     return np.asarray(np.linalg.solve(lower.T, vectors @ (along / (values + strength))))
 
 

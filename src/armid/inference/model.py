@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from armid.errors import ArmidError
 from armid.estimation.constants import Product, products
 from armid.estimation.information import information_at, start_changes
-from armid.estimation.least_squares import MOST_ROUNDS, SETTLED, descend, held_by_bound, promised_fall
+from armid.estimation.least_squares import MOST_ROUNDS, SETTLED_CHI2, descend, held_by_bound, promised_fall
 from armid.inference.candidates import Active, EffectKey, idle
 from armid.inference.library import Activation, Library, calibrated_replays, finest, is_finer, points_within
 from armid.inference.whitening import WhiteRecords
@@ -20,7 +20,7 @@ from armid.problem.problem import by_record, with_each
 from armid.problem.starts import fits_starts, with_starts
 
 # Relative change of the sum of squares at which a fit stops: far below the 1 that means anything in 10,000 samples.
-TOLERANCE, ROUGHLY = 1e-7, 1e-3
+FIT_TOLERANCE, ROUGHLY = 1e-7, 1e-3
 # A change of n_eff ln(chi2) that no comparison of two models tells from none.
 UNTOLD = 0.5
 
@@ -176,7 +176,7 @@ def fit_from(
     """
     z = np.empty(0)
     if records.space.free.any():
-        tried, tolerance, kept = np.array(starts), ROUGHLY if rough else TOLERANCE, records.data.estimates
+        tried, tolerance, kept = np.array(starts), ROUGHLY if rough else FIT_TOLERANCE, records.data.estimates
         chi2 = records.chi2(tried)
         good = tried[np.isfinite(chi2)]
         if not len(good):
@@ -212,7 +212,9 @@ def with_own_starts(fit: Fit, roughly: bool = False) -> Fit:
         last, records = fit, replace(fit.records, replays=with_starts(fit.records.replays, fit.candidate))
         fit = replace(fit_from(records, fit.active, [fit.z], rough=roughly), constants=fit.constants, rough=False)
         untold = UNTOLD / fit.independent if roughly else 0.0
-        if np.all(np.abs(fit.z - last.z) <= SETTLED) or abs(last.chi2 / fit.chi2 - 1.0) <= max(SETTLED, untold):
+        if np.all(np.abs(fit.z - last.z) <= SETTLED_CHI2) or abs(last.chi2 / fit.chi2 - 1.0) <= max(
+            SETTLED_CHI2, untold
+        ):
             break
     return fit
 
@@ -248,7 +250,7 @@ def accurate(fit: Fit, library: Library) -> Fit:
 
 # Shares of their range from which all shapes begin; then each alone from the best of so many places along its range:
 # the best period of a sampled control is narrow; for shapes that are not times an eighth of the places is enough.
-STARTS, N_PLACES = (0.03, 0.5), 384
+STARTS, N_PLACES_OF_SHAPE = (0.03, 0.5), 384
 # Values at which a shape is held in turn where a fit only crept, and the fall of chi2 in a step that leads on from one.
 N_HELD, LEADING = 8, 1e-2
 
@@ -298,12 +300,12 @@ def with_free_shapes(fit: Fit, key: EffectKey, library: Library, problem: WhiteR
     # The strength has taken up what it could of the shape's part, so that each shape is tried without it too.
     rest = records.shares(at_null(records, fit.candidate, key)[records.space.free])
     units = [records.model.parameters[n].unit for n in records.space.free_names]
-    starts += [best_along(records, at, place, N_PLACES if units[place] == "s" else N_PLACES // 8)
+    starts += [best_along(records, at, place, N_PLACES_OF_SHAPE if units[place] == "s" else N_PLACES_OF_SHAPE // 8)
                for place in map(int, np.flatnonzero(free)) for at in (z, rest)]  # fmt: skip
     return fit_from(records, active, [np.clip(z, 1e-3, 1.0 - 1e-3), *starts], rough=True)
 
 
-def best_along(records: WhiteRecords, z: Array, place: int, n: int = N_PLACES) -> Array:
+def best_along(records: WhiteRecords, z: Array, place: int, n: int = N_PLACES_OF_SHAPE) -> Array:
     """Return a candidate with one free parameter at its best value on a grid, the others unchanged, (n_free,)."""
     tried = np.tile(z, (n, 1))
     tried[:, place] = (np.arange(n) + 0.5) / n

@@ -14,7 +14,7 @@ from scipy.special import logsumexp, ndtr
 from armid.estimation.least_squares import held_by_bound
 from armid.inference.checks import train_residuals
 from armid.inference.decisions import calibration
-from armid.inference.evidence import SCALES, Expansion, expansion_of
+from armid.inference.evidence import SCALES_OF_STRENGTH, Expansion, expansion_of
 from armid.inference.hypothesis import Hypotheses, log_prior
 from armid.inference.model import Fit
 from armid.inference.search import Exploration
@@ -28,13 +28,13 @@ UNSEEN = frozenset({("unknown", "output")})
 # A smaller p-value leaves no chance that arithmetic could hold.
 SMALLEST_P = 1e-12
 # What further unknowns of a model are, in words.
-CONSTANTS = "constants within tolerances"
+CONSTANTS_TEXT = "constants within tolerances"
 # How far unknowns are moved along an axis of their posterior, in deviations; how often, as a wider axis is looked at
 # again. Share of the rise of the sum of squares that slopes foretell from which they are believed, and the least that
 # matters. Times it from which the way is taken to bend; how often the others then follow it, and the fall of the rise,
 # as a share of what is left, for which they follow once more.
 DEVIATIONS, MOST_LOOKS, BELIEVED, LEAST_RISE = 2.0, 4, 0.5, 0.05
-BENT, MOST_ANSWERS, FOLLOWED = 2.0, 10, 0.2
+BENT_RISE, MOST_ANSWERS, FOLLOWED = 2.0, 10, 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +155,7 @@ class Posterior:
         """Return the interval that holds 95 % of the mixture."""
         return self.quantile(parameter, 0.025), self.quantile(parameter, 0.975)
 
-    def causes(self, parameter: str, noise: float, beside: str = CONSTANTS) -> list[tuple[str, float]]:
+    def causes(self, parameter: str, noise: float, beside: str = CONSTANTS_TEXT) -> list[tuple[str, float]]:
         """Return what makes the interval of a parameter wide, with shares of the variance, the largest first.
 
         noise: deviation by noise alone, SI. beside: name of the other unknowns of the most probable model.
@@ -262,7 +262,7 @@ def spread(about: Expansion) -> Array:
     n, fit = int(about.kept.sum()), about.fit
     is_known = np.isin(np.arange(fit.n_free), fit.records.rows[0])[about.kept]
     flat = about.precision / np.append(np.where(is_known, 1.0, 2.0 * np.pi), np.ones(len(about.precision) - n))
-    usual = float(np.sqrt(np.mean(SCALES**2))) * about.sizes[about.kept]
+    usual = float(np.sqrt(np.mean(SCALES_OF_STRENGTH**2))) * about.sizes[about.kept]
     flat[:n] *= np.where(usual < 1.0, 1.0 / usual, 1.0) ** 2
     columns, cover = confirmed_slopes(fit, about.unknowns, flat, about.scale.weight), fit.records.data.cover
     known = about.scale.weight * columns.T @ columns + np.diag(flat)
@@ -328,7 +328,7 @@ def rises(
         answered = [left(along, i, np.array([tried[i], tried[n + i], residual])) for i in range(n)]
         now = np.array([0.5 * (above + below) - middle for (above, below, middle), _ in answered])
         rise = np.where(bends, np.fmin(rise, now), rise)
-        bends &= np.isfinite(rise) & (rise > np.where(np.isfinite(before), LEAST_RISE, BENT) * foretold)
+        bends &= np.isfinite(rise) & (rise > np.where(np.isfinite(before), LEAST_RISE, BENT_RISE) * foretold)
         fell = np.where(bends, before, 0.0) - np.where(bends, rise, 0.0)
         if not (bends & (fell > FOLLOWED * rise)).any():
             break

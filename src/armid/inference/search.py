@@ -42,17 +42,17 @@ N_BESIDE, N_SIGNALS = 2, 2
 N_LEADING, MOST_EXPANDED, MOST_EFFECTS = 24, 16, 8
 # Of records with more samples than this, and with so many constants within tolerances half, fewer models are expanded,
 # but for so many.
-SAMPLES, CONSTANTS, FEWEST_EXPANDED = 4_000, 10, 8
+SAMPLES, USUAL_CONSTANTS, FEWEST_EXPANDED = 4_000, 10, 8
 # Far from the noise: models that are expanded in turn without a better one, after which what is missing has no name.
 MOST_IN_VAIN = 4
 # A model is brought to its estimate at most so often in turn.
 MOST_COMPLETED = 4
 # Mean square of the best model, in units of the noise, up to which rivals are begun afresh.
-NEAR = 2.0
+NEAR_NOISE = 2.0
 # Rivals that differ from the best model in one name and are brought to their estimates.
 N_TWINS = 3
 # Strengths at which a swapped effect is tried, as multiples of the linear guess.
-STRENGTHS = 2.0 ** np.arange(-4, 5)
+STRENGTHS_OF_FORM = 2.0 ** np.arange(-4, 5)
 # Models of each size that are expanded outside the window where more than noise is left.
 BEAM = 3
 
@@ -134,7 +134,7 @@ def explore(library: Library, declared: Fit, most: int | None = None) -> Explora
     """
     exploration = Exploration(library, effects.hypotheses(library))
     exploration.constants = constants_of(declared.records, declared.z, library.tolerances)
-    cost = len(declared.residual) / SAMPLES * (1.0 + len(exploration.constants) / CONSTANTS)
+    cost = len(declared.residual) / SAMPLES * (1.0 + len(exploration.constants) / USUAL_CONSTANTS)
     most = most or int(np.clip(MOST_EXPANDED / cost, FEWEST_EXPANDED, MOST_EXPANDED))
     exploration.fits[frozenset()] = declared
     exploration.fits[frozenset()] = with_constants(declared, exploration.constants, exploration.scale().weight)
@@ -438,7 +438,7 @@ def swapped(
     new = replace(new, free_shape=key.free_shape and bool(library.fixed_shapes(new)))
     active = (*(k for k in fit.active if k != key), new)
     values = {n: v for n, v in fit.values.items() if not key.owns(n)}
-    shares = np.clip(strength * STRENGTHS, 0.01, library.reach)
+    shares = np.clip(strength * STRENGTHS_OF_FORM, 0.01, library.reach)
     guesses = [values | proposal.grid[variant].at(float(share)) for share in shares]
     return near(fit, active, guesses, library, weight, limit)
 
@@ -552,7 +552,7 @@ def complete(exploration: Exploration, model: Hypotheses) -> None:
 
 def is_near(exploration: Exploration) -> bool:
     """Tell whether the best model is near the noise, so that a few log units count."""
-    return NEAR * exploration.scale().weight * len(exploration.declared.residual) > exploration.scale().n
+    return NEAR_NOISE * exploration.scale().weight * len(exploration.declared.residual) > exploration.scale().n
 
 
 def completed(fit: Fit, library: Library, constants: Sequence[Unknown], weight: float) -> Fit:

@@ -16,13 +16,13 @@ from scipy.optimize import least_squares
 from armid.errors import ArmidError
 from armid.estimation.constants import Product, moved_replays, products
 from armid.estimation.least_squares import (
-    FIRST,
+    FIRST_DAMPING,
     LADDER,
-    LARGEST,
-    LEAST,
-    MOST_STEPS,
+    LARGEST_DAMPING,
+    LEAST_DAMPING,
+    MOST_ITERATIONS,
     RAISED,
-    REACH,
+    REACH_OF_PATH,
     Descent,
     LeastSquaresProblem,
     forward_slopes,
@@ -36,11 +36,11 @@ from armid.problem.problem import ReadyRecord, signals_of_each, with_each
 from armid.problem.starts import fits_starts, with_shown_starts, with_starts
 
 # Step of the differences, in prior standard deviations.
-STEP = 1e-2
+UNKNOWN_STEP = 1e-2
 # Of a fit that is polished: relative change at which it ends, and how far inside the box it stays, as a share.
-ARRIVED, INSIDE = 1e-8, 1e-6
+ARRIVED_STEP, INSIDE = 1e-8, 1e-6
 # Fall of the weighted sum of squares at which a fit has arrived. Columns are old below this share of a foretold fall.
-SETTLED, FORETOLD = 0.1, 0.7
+SETTLED_COST, FORETOLD = 0.1, 0.7
 # Most steps of a rough fit: from far away it takes 16 to come near.
 MOST_ROUGH = 20
 
@@ -152,13 +152,16 @@ def freed(
     kept = {f.unknown.name: f.column for f in fit.others}
     values, z = np.array([known.get(u.name, 0.0) for u in unknowns]), fit.z
     (cost,), (residual,) = costs_at(base, unknowns, values[np.newaxis], z[np.newaxis], weight)
-    damping, columns, is_new = FIRST, columns_about(base.plain, unknowns, values, z, kept), not kept
-    for _ in range(MOST_ROUGH if rough else MOST_STEPS):
+    damping, columns, is_new = FIRST_DAMPING, columns_about(base.plain, unknowns, values, z, kept), not kept
+    for _ in range(MOST_ROUGH if rough else MOST_ITERATIONS):
         problem = moved(base, unknowns, values)
         here, square, slope = normal_equations(problem, residual, columns, values, z, weight)
-        if cost - REACH * float(slope @ (step_in_box(square, slope, here, LEAST, len(z)) - here)) > limit:
+        if (
+            cost - REACH_OF_PATH * float(slope @ (step_in_box(square, slope, here, LEAST_DAMPING, len(z)) - here))
+            > limit
+        ):
             break
-        dampings = [max(factor * damping, LEAST) for factor in LADDER]
+        dampings = [max(factor * damping, LEAST_DAMPING) for factor in LADDER]
         tried = np.array([step_in_box(square, slope, here, d, len(z)) for d in dampings])
         costs, residuals = costs_at(base, unknowns, tried[:, len(z) :], tried[:, : len(z)], weight)
         best = int(np.argmin(costs))
@@ -172,8 +175,8 @@ def freed(
                 cost = min(cost, begun)
         elif is_new:
             damping *= RAISED
-        has_arrived = weight * fall < max(SETTLED, ROUGHLY * weight * cost if rough else 0.0)
-        if is_new and ((has_arrived and fall > 0.0) or damping > LARGEST):
+        has_arrived = weight * fall < max(SETTLED_COST, ROUGHLY * weight * cost if rough else 0.0)
+        if is_new and ((has_arrived and fall > 0.0) or damping > LARGEST_DAMPING):
             break
         if is_new and not fall > 0.0:  # columns that were taken here need no others, only a shorter step
             continue
@@ -208,7 +211,7 @@ def polished(fit: Fit, weight: float) -> Fit:
         return fit
     unknowns, n = [f.unknown for f in fit.others], len(fit.z)
     here = np.concatenate([np.clip(fit.z, INSIDE, 1.0 - INSIDE), [f.value for f in fit.others]])
-    steps = np.repeat([Z_STEP, STEP], [n, len(unknowns)])
+    steps = np.repeat([Z_STEP, UNKNOWN_STEP], [n, len(unknowns)])
     low, high = np.repeat([0.0, -np.inf], [n, len(unknowns)]), np.repeat([1.0, np.inf], [n, len(unknowns)])
 
     def residuals(X: Array) -> Array:
@@ -223,8 +226,8 @@ def polished(fit: Fit, weight: float) -> Fit:
     def residual(x: Array) -> Array:
         return np.asarray(residuals(x[np.newaxis])[0])
 
-    solution = least_squares(residual, here, slopes, (low, high), x_scale="jac",
-                             ftol=ARRIVED, xtol=ARRIVED, gtol=ARRIVED, max_nfev=MOST_STEPS)  # fmt: skip
+    solution = least_squares(residual, here, slopes, (low, high), x_scale="jac", max_nfev=MOST_ITERATIONS,
+                             ftol=ARRIVED_STEP, xtol=ARRIVED_STEP, gtol=ARRIVED_STEP)  # fmt: skip
     z, values = solution.x[:n], solution.x[n:]
     # what came to the edge of the inside is on the bound
     z = np.clip(z + INSIDE * (2.0 * z - 1.0), 0.0, 1.0)
@@ -307,9 +310,9 @@ def columns_about(
     kept: columns that are known.
     """
     stepped = [i for i, u in enumerate(unknowns) if u.name not in kept and u.column is None]
-    points = np.vstack([values, values + STEP * np.eye(len(values))[stepped]])
+    points = np.vstack([values, values + UNKNOWN_STEP * np.eye(len(values))[stepped]])
     residuals = residuals_at(base, unknowns, points, np.tile(z, (len(points), 1)))
-    by_steps = dict(zip(stepped, (residuals[0] - residuals[1:]) / STEP, strict=True))
+    by_steps = dict(zip(stepped, (residuals[0] - residuals[1:]) / UNKNOWN_STEP, strict=True))
 
     def column(i: int, unknown: Unknown) -> Array:
         if unknown.name in kept:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, eigh
 
-from armid.estimation.input_noise import SMALLEST, answers
+from armid.estimation.input_noise import SMALLEST_SEEN, answers
 from armid.estimation.least_squares import Estimates, LeastSquaresProblem
 from armid.estimation.noise_model import MISFIT, NoiseModel, noise_levels, sensor_of
 from armid.model import Array, Plant
@@ -48,7 +48,7 @@ class Cover:
     @classmethod
     def seen(cls, columns: Array) -> "Cover":
         """Return the cover of many columns without what the samples do not see."""
-        sizes, vectors = eigh(columns.T @ columns, subset_by_value=[SMALLEST, np.inf])
+        sizes, vectors = eigh(columns.T @ columns, subset_by_value=[SMALLEST_SEEN, np.inf])
         return cls(columns @ vectors / np.sqrt(sizes), sizes)
 
     @property
@@ -60,7 +60,7 @@ class Cover:
         """Return the cover with columns of signals that may act instead, each of one standard deviation."""
         white = self.white(columns.T).T
         squares, vectors = np.linalg.eigh(white.T @ white)
-        return replace(self, elsewhere=white @ vectors[:, np.searchsorted(squares, SMALLEST) :])
+        return replace(self, elsewhere=white @ vectors[:, np.searchsorted(squares, SMALLEST_SEEN) :])
 
     def taken(self, unknowns: Array, weight: float) -> Array:
         """Return the information on unknowns, (n_samples, n), that signals elsewhere take away, (n, n).

@@ -9,7 +9,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from armid.estimation.advice import Advice, Rival, advise
-from armid.estimation.constants import STEP, common_factors, moved_record
+from armid.estimation.constants import CONSTANT_STEP, common_factors, moved_record
 from armid.estimation.corrections import DataIssue
 from armid.estimation.data_checks import AS_GOOD, data_issues, given_twice
 from armid.estimation.design import manoeuvre_grid
@@ -363,6 +363,6 @@ def known_together(fit: Fit, library: Library) -> tuple[str, ...]:
 def slope(fit: Fit, records: WhiteRecords, name: str, size: float) -> Array:
     """Return the change of the whitened signal by a parameter, its size taken as 1, about a fit, (n_samples,)."""
     both = np.tile(candidate_at(records, fit.values), (2, 1))
-    both[:, records.space.index(name)] += np.array([STEP, -STEP]) * size
+    both[:, records.space.index(name)] += np.array([CONSTANT_STEP, -CONSTANT_STEP]) * size
     upper, lower = replace(records, data=fit.records.data).whole_signals(both)
-    return np.asarray((upper - lower) / (2.0 * STEP))
+    return np.asarray((upper - lower) / (2.0 * CONSTANT_STEP))

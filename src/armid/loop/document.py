@@ -8,7 +8,7 @@ import numpy as np
 
 from armid.errors import ArmidError
 from armid.estimation.identify import versions_of
-from armid.estimation.identify_document import PACKAGES
+from armid.estimation.identify_document import PACKAGES_OF_IDENTIFY
 from armid.inference.carry_over import missed_sentences
 from armid.inference.checks import Finding, Residuals, time_in_words
 from armid.inference.decisions import LISTED, OVER_NOISE, SIGNIFICANCE
@@ -23,9 +23,9 @@ from armid.loop.result import (
     IMPLAUSIBLE,
     NO_DISCREPANCY,
     PARTLY,
+    REPORT_VERSION,
     TOO_ALIKE,
     UNEXPLAINED,
-    VERSION,
     ClosedLoop,
     Judgement,
     fault_sentence,
@@ -63,14 +63,18 @@ from armid.report.document import (
 from armid.report.result import Parts
 from armid.units import scale_of, shown
 
-TIMES = {"1": "", "direction": ", times the direction of motion,", "drive_effort": ", times the effort of the drive,"}
+TIMES_IN_WORDS = {
+    "1": "",
+    "direction": ", times the direction of motion,",
+    "drive_effort": ", times the effort of the drive,",
+}
 # A shift of a parameter by more than this share of its value, and of its interval, is listed.
 SHIFTED = 0.01
-MOST_TOLD, MOST_PORTS, MOST_EXACT, MOST_DRAWN = 3, 5, 5, 6
+MOST_FINDINGS, MOST_PORTS, MOST_EXACT, MOST_DRAWN = 3, 5, 5, 6
 # A manoeuvre that separates rivals with a smaller chance is not advice.
 WEAK = 0.2
 # Smaller chances than this are all the same.
-LEAST = 1e-12
+LEAST_CHANCE = 1e-12
 # Smallest share that is shown: a smaller one is rounded to 0 %.
 LEAST_SHARE = 0.005
 # Figures that a page takes as they are stored: name -> title and caption.
@@ -110,7 +114,7 @@ def loop_document(
 
     report, details: report.json and details.json; for the others see `identify_document`.
     """
-    if report.get("version") != VERSION:
+    if report.get("version") != REPORT_VERSION:
         raise ArmidError(f"report.json of {report['campaign']} was written by another version of armid: the same "
                          "`armid close-loop` again is expected")  # fmt: skip
     figures = stored_figures(FIGURES, svgs)
@@ -330,7 +334,7 @@ def details_of(loop: ClosedLoop) -> dict[str, Any]:
         for name, judged in (("before", before), ("after", after))
     }  # fmt: skip
     return plain({
-        "versions": versions_of(PACKAGES),
+        "versions": versions_of(PACKAGES_OF_IDENTIFY),
         "conclusion": conclusion(loop),
         "shifts": shift_sentences(before, after) if loop.steps else [],
         "doubts": doubt_sentences(after),
@@ -468,7 +472,7 @@ def missing_sentences(missing: Missing) -> list[str]:
     said = [f"A signal without a form would remove this share of the residual at port: {ports}."]
     best = {d.variable: d for d in sorted(missing.dependences, key=lambda d: d.share)}
     ranked = sorted((d for d in best.values() if d.share >= LEAST_SHARE), key=lambda d: -d.share)[:MOST_PORTS]
-    curves = ", ".join(f"{d.variable}{TIMES[d.factor]} at {d.port} {d.share:.0%}" for d in ranked)
+    curves = ", ".join(f"{d.variable}{TIMES_IN_WORDS[d.factor]} at {d.port} {d.share:.0%}" for d in ranked)
     if not curves:
         return [*said, "What the residual follows was not found: no curve predicts parts left out of its fit."]
     return [
@@ -486,10 +490,10 @@ def diagnosis_sentences(seen: Residuals) -> list[str]:
     def significant(kind: str) -> list[Finding]:
         """Return the significant findings of one kind, the largest first."""
         findings = [f for f in diagnosis.of_kind(kind) if f.p * len(diagnosis.findings) < SIGNIFICANCE]
-        return sorted(findings, key=lambda f: -f.ratio)[:MOST_TOLD]
+        return sorted(findings, key=lambda f: -f.ratio)[:MOST_FINDINGS]
 
-    said = [f"What remains is more than noise (chance {'below ' if diagnosis.p < LEAST else ''}"
-            f"{max(diagnosis.p, LEAST):.2g})."]  # fmt: skip
+    said = [f"What remains is more than noise (chance {'below ' if diagnosis.p < LEAST_CHANCE else ''}"
+            f"{max(diagnosis.p, LEAST_CHANCE):.2g})."]  # fmt: skip
     if not diagnosis.noise_known:
         said.append("No rest tells the noise: the residual is tested against itself.")
     wholes = {

@@ -19,10 +19,15 @@ from armid.units import scale_of, shown
 
 LOOKS = (("before", OKABE_ITO["vermilion"]), ("after", OKABE_ITO["blue"]))
 AFTER = OKABE_ITO["blue"]
-KINDS = {"record": "record", "stage": "stage of the motion", "frequency": "frequency", "dependence": "dependence on"}
-MOST_RECORDS, MOST_NAMED, MOST_LAGS, MOST_VARIABLES = 8, 14, 150, 5
+KINDS_OF_TEST = {
+    "record": "record",
+    "stage": "stage of the motion",
+    "frequency": "frequency",
+    "dependence": "dependence on",
+}
+MOST_RECORDS_DRAWN, MOST_BARS, MOST_LAGS_DRAWN, MOST_VARIABLES = 8, 14, 150, 5
 # Of the mean residual over a variable, and the least bar of the diagnosis.
-MOST_PARTS, LEAST_RATIO = 30, 1e-3
+MOST_BINS, LEAST_RATIO = 30, 1e-3
 PARAMETERS_A_ROW = 4
 
 
@@ -48,7 +53,7 @@ def shown_records(loop: ClosedLoop) -> list[tuple[Replay, Array, Array]]:
     """Return the records that are drawn, each with its residual before and after."""
     views = ((loop.before.train, loop.after.train), (loop.before.holdout, loop.after.holdout))
     return [row for old, new in views if old is not None and new is not None
-            for row in zip(old.replays, old.raw, new.raw, strict=True)][-MOST_RECORDS:]  # fmt: skip
+            for row in zip(old.replays, old.raw, new.raw, strict=True)][-MOST_RECORDS_DRAWN:]  # fmt: skip
 
 
 def motion_figure(loop: ClosedLoop) -> Any:
@@ -111,7 +116,7 @@ def draw_residuals(axis: Any, curves: Mapping[str, Any], noise: float | None, si
 def diagnosis_figure(loop: ClosedLoop) -> Any:
     """Draw a bar for each part of the residual, from 1, which is noise, to its mean square; the largest come first."""
     before, after = loop.before.diagnosis, loop.after.diagnosis
-    kinds = {k: sorted(before.of_kind(k), key=lambda f: -f.ratio) for k in KINDS if before.of_kind(k)}
+    kinds = {k: sorted(before.of_kind(k), key=lambda f: -f.ratio) for k in KINDS_OF_TEST if before.of_kind(k)}
     heights = [len(findings) + 1 for findings in kinds.values()]
     size = (7.6, 0.34 * sum(heights) + 1.4)
     figure, axes = pyplot().subplots(len(kinds), 1, figsize=size, height_ratios=heights, squeeze=False, sharex=True,
@@ -126,7 +131,7 @@ def diagnosis_figure(loop: ClosedLoop) -> Any:
         axis.set_yticks(rows, [f.where for f in findings], fontsize="small")
         axis.set_ylim(len(findings) - 0.5, -0.5)
         log_axis(axis)
-        axis.set_title(KINDS[kind], fontsize="medium", loc="left")
+        axis.set_title(KINDS_OF_TEST[kind], fontsize="medium", loc="left")
     of = "noise" if before.noise_known else "the residual"
     axes[-1, 0].set_xlabel(f"mean square / that of {of}")
     legend_below(figure, 2)
@@ -145,7 +150,7 @@ def against_figure(loop: ClosedLoop) -> Any:
         for residuals, (label, colour) in zip(seen, LOOKS, strict=True):
             x, y = sorted_by(residuals, name, place)
             axis.plot(factor * x, height * y, ".", ms=1.5, alpha=0.25, color=colour)
-            means = [np.array([part.mean() for part in np.array_split(values, MOST_PARTS)]) for values in (x, y)]
+            means = [np.array([part.mean() for part in np.array_split(values, MOST_BINS)]) for values in (x, y)]
             axis.plot(factor * means[0], height * means[1], color=colour, lw=2.0, label=label)
         axis.axhline(0.0, color=GREY, lw=0.8)
         axis.set(xlabel=f"{name} [{unit}]", ylabel=f"residual [{signal_unit}]")
@@ -172,7 +177,7 @@ def moved(loop: ClosedLoop) -> list[str]:
 def probability_figure(campaign: str, chances: Mapping[str, Any]) -> Any:
     """Draw the probability of each effect and fault, of nothing and of something unknown. chances: of `report.json`."""
     named = [(n, p, AFTER) for kind in ("effects", "records", "drifts") for n, p in chances[kind].items()]
-    named = sorted(named, key=lambda row: -row[1])[:MOST_NAMED]
+    named = sorted(named, key=lambda row: -row[1])[:MOST_BARS]
     ends = (("nothing", OKABE_ITO["green"]), ("unknown", OKABE_ITO["vermilion"]))
     rows = [*named, *((n, chances[n], colour) for n, colour in ends)]
     figure, axis = pyplot().subplots(figsize=(6.8, 0.34 * len(rows) + 1.3), layout="constrained")
@@ -268,7 +273,7 @@ def autocorrelation_figure(loop: ClosedLoop) -> Any:
 def correlation(residuals: Residuals) -> Array:
     """Return the autocorrelation at lags from 0 on, pooled over records, (n_lags,)."""
     parts = residuals.data.by_record(residuals.residual)
-    lags = min(MOST_LAGS, *(len(p) - 1 for p in parts))
+    lags = min(MOST_LAGS_DRAWN, *(len(p) - 1 for p in parts))
     table = [[float(p[: len(p) - k] @ p[k:]) for k in range(lags)] for p in parts]
     total = np.sum(table, axis=0)
     return np.asarray(total / total[0])

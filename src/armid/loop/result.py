@@ -17,7 +17,7 @@ from armid.inference.decisions import AS_WELL, CLAIMED, MENTIONED, OVER_NOISE
 from armid.inference.evidence import expansion_of
 from armid.inference.hypothesis import Hypotheses, Hypothesis, words
 from armid.inference.infer import Inference
-from armid.inference.kinds.drifts import LARGEST, OfParameter
+from armid.inference.kinds.drifts import LARGEST_DRIFT, OfParameter
 from armid.inference.kinds.faults import OfRecord
 from armid.inference.library import Library
 from armid.inference.missing_signal import Missing
@@ -41,7 +41,7 @@ NOT_IDENTIFIED = "it was not identified: its value is declared"
 # Listed causes of the width of an interval, and listed models.
 MOST_CAUSES, MOST_LISTED = 2, 30
 # Of the keys of report.json: 2 came with probabilities.
-VERSION = 2
+REPORT_VERSION = 2
 
 
 @dataclass(frozen=True)
@@ -299,7 +299,7 @@ def report_of(loop: ClosedLoop) -> dict[str, Any]:
         What report.json holds.
     """
     return plain({
-        "version": VERSION,
+        "version": REPORT_VERSION,
         "campaign": loop.campaign.name,
         "plant": loop.campaign.plant.name,
         "unit": loop.campaign.unit,
@@ -415,7 +415,7 @@ def fault_of(what: OfRecord, name: str, fit: Fit, inference: Inference) -> Recor
 
 def drift_of(what: OfParameter, name: str, fit: Fit, inference: Inference) -> RecordFault:
     value, half = size_of(f"drift of {name}", fit, inference)
-    last, factor, unit = fit.records.data.records[-1], LARGEST, "1"
+    last, factor, unit = fit.records.data.records[-1], LARGEST_DRIFT, "1"
     if what.product is None:
         place = list(fit.values).index(what.name)
         factor, unit = factor * float(fit.records.span[place]), fit.model.parameters[what.name].unit

@@ -9,7 +9,7 @@ from armid.model.parameter import Parameter, check_name
 
 Equation = Callable[..., Any]
 # How the nodes of a composed model begin: an effect of this name would look like them.
-RESERVED = ("rate", "initial", "guard")
+RESERVED_WORDS = ("rate", "initial", "guard")
 SIGN_WIDTH = Parameter("width", "speed", 0.0005, 0.05, fixed=0.005, note="speed over which the sign is smoothed")
 SIZE_WIDTH = replace(SIGN_WIDTH, note="speed over which the size of speed is smoothed")
 
@@ -112,8 +112,8 @@ class Effect:
 
     def __post_init__(self) -> None:
         check_name(self.name, "effect")
-        if self.name in RESERVED:
-            raise ModelError(f"effect '{self.name}' cannot have this name: {', '.join(RESERVED)} are taken")
+        if self.name in RESERVED_WORDS:
+            raise ModelError(f"effect '{self.name}' cannot have this name: {', '.join(RESERVED_WORDS)} are taken")
         if not self.adds:
             raise ModelError(f"effect '{self.name}' adds to no port: at least one is expected in `adds`")
         own = (self.parameters, self.states, self.guards, self.delays)

@@ -49,7 +49,7 @@ class Parameter:
 
 
 # By such a factor a value misses its declared range that was given in another unit: degrees, percent, MPa.
-FAR = 20.0
+FAR_OUT = 20.0
 
 
 def warn_if_far(parameter: Parameter, values: Sequence[float], where: str) -> None:
@@ -61,11 +61,11 @@ def warn_if_far(parameter: Parameter, values: Sequence[float], where: str) -> No
     declared = f"the declared range, {low:g} to {high:g} {parameter.unit}; it is taken as it is"
     if low > 0.0 and any(v < 0.0 for v in values):
         warnings.warn(f"{where} is negative, outside {declared}", stacklevel=3)
-    elif all(abs(v) > FAR * max(abs(low), abs(high)) or (low > 0.0 and FAR * v < low) for v in values):
+    elif all(abs(v) > FAR_OUT * max(abs(low), abs(high)) or (low > 0.0 and FAR_OUT * v < low) for v in values):
         warnings.warn(f"{where} is far outside {declared}", stacklevel=3)
 
 
-WORDS = ("effort", "speed", "inertia", "s", "1")
+SCALE_WORDS = ("effort", "speed", "inertia", "s", "1")
 
 
 @dataclass(frozen=True)
@@ -102,8 +102,8 @@ def powers_of(unit: str) -> dict[str, int] | None:
                          "are expected")  # fmt: skip
     powers: dict[str, int] = {}
     for sign, word, power in re.findall(r"(^|[*/])(\w+)(?:\^(\d))?", unit):
-        if word not in WORDS:
-            raise ModelError(f"unit '{unit}' holds '{word}': {nearest(word, WORDS)}")
+        if word not in SCALE_WORDS:
+            raise ModelError(f"unit '{unit}' holds '{word}': {nearest(word, SCALE_WORDS)}")
         powers[word] = powers.get(word, 0) + (-1 if sign == "/" else 1) * int(power or 1)
     return powers
 

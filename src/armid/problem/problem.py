@@ -252,7 +252,7 @@ def weighted(signals: Sequence[Array], measured: Sequence[Array], weights: Array
 
 # Values of signals in memory at a time (64 MB), and what the numbers of candidates at a time are multiples of, so that
 # the engine's lanes are full.
-MOST_VALUES, LANES = 2**23, 16
+MOST_AT_ONCE, LANES = 2**23, 16
 
 
 class IdentificationProblem(Metered):
@@ -302,7 +302,7 @@ class IdentificationProblem(Metered):
         """Return fitness, +inf where one diverged, and where asked the weighted residuals, (n_candidates, n_total)."""
         if not residuals:
             # so many candidates have their signals in memory at a time; no result depends on it
-            size = LANES * max(MOST_VALUES // (LANES * sum(x.size for x in self.measured)), 1)
+            size = LANES * max(MOST_AT_ONCE // (LANES * sum(x.size for x in self.measured)), 1)
             parts = [self._fitness(X[first : first + size])[0] for first in range(0, max(len(X), 1), size)]
             return parts[0] if len(parts) == 1 else np.concatenate(parts), None
         values, signals = self._fitness(X)

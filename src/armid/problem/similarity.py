@@ -8,7 +8,7 @@ from armid.errors import ArmidError
 from armid.model import Array
 
 # A lone extremum is noise nearer to an end than this share of the length, and lower than so many times the noise.
-NEAR_END, LEAST_HEIGHT = 0.03, 3.0
+NEAR_END, LEAST_PEAK = 0.03, 3.0
 
 
 def similarity(
@@ -89,7 +89,7 @@ def scored(
         raise ArmidError(f"epsilon is {epsilon}, xi {xi} and noise {noise}, expected numbers of at least 0")
     scores, whole, n_intervals = score(
         x, rows, float(interval), float(epsilon), float(xi), float(slope_threshold), float(failed),
-        LEAST_HEIGHT * noise,
+        LEAST_PEAK * noise,
     )  # fmt: skip
     refuse_zero(whole)
     if n_intervals == 0:

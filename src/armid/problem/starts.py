@@ -24,10 +24,10 @@ from armid.record.sensor import correlation_sum
 # Step of the differences, as a share of the plant's speed scale; a speed held for a second is the size of a position.
 MOVE = 1e-4
 # So many steps to the start at most; a step ends them that lowers chi2 by less than this. Steps that do not are halved.
-MOST_STEPS, ARRIVED, MOST_HALVINGS = 10, 1e-3, 6
-N_PROBES = 48
+MOST_OF_START, ARRIVED_START, MOST_HALVINGS = 10, 1e-3, 6
+N_PROBES_OF_STARTS = 48
 # What the reader saw of a start holds it with so many times its deviation: the fit sees the same samples again.
-WIDER = 3.0
+WIDER_START = 3.0
 # The noise counts as at least this share of the size of an output, where a simulation has none.
 LEAST_NOISE = 1e-6
 
@@ -63,7 +63,7 @@ def with_shown_starts(ready: ReadyRecord) -> ReadyRecord:
 
 def likely_candidate(replays: Sequence[Replay], space: Space) -> Array:
     """Return the whole candidate of 48 over the box that comes nearest to the records, each from its best start."""
-    spread = space.complete(probes(space.low[space.free], space.high[space.free], N_PROBES))
+    spread = space.complete(probes(space.low[space.free], space.high[space.free], N_PROBES_OF_STARTS))
     chi2 = np.zeros(len(spread))
     for ready in by_record(replays):
         for k in range(len(ready.record.pieces)):
@@ -151,7 +151,7 @@ class Start:
         """The start that the reader saw, and how far from it the fit may go, SI, both (n_constants,)."""
         piece = self.piece
         deviations = np.array([piece.start_deviation[name] for name in self.names])
-        return np.array(list(piece.shown_start.values())), WIDER * deviations
+        return np.array(list(piece.shown_start.values())), WIDER_START * deviations
 
     def beyond(self, residual: Array, slopes: Array) -> Array:
         """Return what no start can do of a residual, (n_seen,), infinite where the simulation diverges."""
@@ -183,7 +183,7 @@ class Start:
         if not self.names:
             return piece
         signals, slopes = self.linear(constants, population)
-        for _ in range(MOST_STEPS):
+        for _ in range(MOST_OF_START):
             residual, seen = self.residual(signals)[0], self.seen_slopes(slopes)[:, 0]
             if not (np.isfinite(residual).all() and np.isfinite(seen).all()):
                 return piece
@@ -197,7 +197,7 @@ class Start:
                 break
             constants = shorter[better[0]]
             signals, slopes = self.linear(constants, population)
-            if before - costs[better[0]] < ARRIVED:
+            if before - costs[better[0]] < ARRIVED_START:
                 break
         if not np.isfinite(slopes).all():
             return piece

@@ -30,10 +30,10 @@ VERSION = 1
 N_INSTANCES = 15
 INTERVAL_S = 1e-3
 # The truth keeps this share of the range away from each bound.
-MARGIN = 0.15
+MARGIN_OF_TRUTH = 0.15
 # Start and target angle [deg], with the shell, supply voltage [V].
-LOWER, RAISE, SHORT, EMPTY = (-48, 22, 1, 28.0), (22, -48, 1, 28.0), (-48, -8, 1, 28.0), (-48, 22, 0, 28.0)
-FOUR = (LOWER, RAISE, SHORT, EMPTY)
+LOWER, RAISE, SHORT_STROKE, EMPTY = (-48, 22, 1, 28.0), (22, -48, 1, 28.0), (-48, -8, 1, 28.0), (-48, 22, 0, 28.0)
+FOUR = (LOWER, RAISE, SHORT_STROKE, EMPTY)
 FRICTION = {
     "coulomb.level": (0.0, 80.0), "viscous.slope": (0.0, 60.0), "stribeck.level": (0.0, 60.0),
     "stribeck.fade": (0.04, 0.6),
@@ -46,7 +46,7 @@ SUPPLY = {
     "supply_sag.resistance": (0.0, 0.05), "flux_saturation.sharpness": (0.0, 0.01), "brush_drop.drop": (0.0, 3.0),
     "supply_error.error": (-0.1, 0.1),
 }  # fmt: skip
-LAGS = {
+LAG_RANGES = {
     "drive_lag.time_constant": (0.0, 0.05), "tachometer_lag.time_constant": (0.0, 0.03),
     "output_lag.time_constant": (0.0, 0.03),
 }  # fmt: skip
@@ -63,11 +63,11 @@ SENSOR = {
 RIPPLE = {
     "torque_ripple.sine": (-60.0, 60.0), "torque_ripple.cosine": (-60.0, 60.0), "torque_ripple.waves": (20.0, 200.0),
 }  # fmt: skip
-WHOLE = FRICTION | SUPPLY | {"drive_lag.time_constant": (0.0, 0.05), "tilt.angle": (-0.1, 0.1)}
-OBJECTIVES, UNITS = ("one", "records"), ("box", "SI")
-N_STEPS, N_LINES = 512, 24
+WHOLE_RANGES = FRICTION | SUPPLY | {"drive_lag.time_constant": (0.0, 0.05), "tilt.angle": (-0.1, 0.1)}
+OBJECTIVES, UNITS_OF_PARAMETERS = ("one", "records"), ("box", "SI")
+N_OF_GRID, N_LINES = 512, 24
 # Class of difficulty, the measure that decides it, and the limit above which it holds; fixed before any search was run.
-CLASSES = (
+CLASSES_OF_FORMS = (
     ("stair", "stair", 0.05),
     ("plateau", "plateau", 0.15),
     ("rugged", "minima", 1.5),
@@ -89,7 +89,7 @@ class Definition:
     noise_deg_s: float = 0.0
 
 
-SIMILAR, NOISY, LONG = "similarity", 0.3, 1.2
+SIMILAR, NOISY, LONG_STROKE = "similarity", 0.3, 1.2
 DEFINITIONS: dict[str, Definition] = {
     "arm": Definition(),
     "arm_noisy": Definition(noise_deg_s=NOISY),
@@ -97,24 +97,24 @@ DEFINITIONS: dict[str, Definition] = {
     "arm_similarity_noisy": Definition(fitness=SIMILAR, noise_deg_s=NOISY),
     "arm_shape": Definition(fitness="shape_similarity"),
     "arm_short": Definition(duration_s=0.6, noise_deg_s=NOISY),
-    "arm_four": Definition(strokes=FOUR, duration_s=LONG),
+    "arm_four": Definition(strokes=FOUR, duration_s=LONG_STROKE),
     "friction": Definition(FRICTION),
     "friction_noisy": Definition(FRICTION, noise_deg_s=NOISY),
     "friction_similarity": Definition(FRICTION, SIMILAR),
     "ripple": Definition(RIPPLE, strokes=(LOWER, RAISE)),
     "ripple_noisy": Definition(RIPPLE, noise_deg_s=NOISY),
-    "sticking": Definition(STICKING, strokes=(RAISE,), duration_s=LONG),
-    "sticking_similarity": Definition(STICKING, SIMILAR, strokes=(RAISE,), duration_s=LONG),
+    "sticking": Definition(STICKING, strokes=(RAISE,), duration_s=LONG_STROKE),
+    "sticking_similarity": Definition(STICKING, SIMILAR, strokes=(RAISE,), duration_s=LONG_STROKE),
     "supply": Definition(SUPPLY),
-    "supply_four": Definition(SUPPLY, strokes=FOUR, duration_s=LONG, noise_deg_s=NOISY),
-    "lags_similarity": Definition(LAGS, SIMILAR, strokes=(LOWER, SHORT)),
+    "supply_four": Definition(SUPPLY, strokes=FOUR, duration_s=LONG_STROKE, noise_deg_s=NOISY),
+    "lags_similarity": Definition(LAG_RANGES, SIMILAR, strokes=(LOWER, SHORT_STROKE)),
     "rocking": Definition(ROCKING),
     "rocking_similarity": Definition(ROCKING, SIMILAR),
-    "rocking_friction": Definition(ROCKING | FRICTION, strokes=(LOWER, RAISE), duration_s=LONG),
-    "balance": Definition(BALANCE | WORM, strokes=(LOWER, RAISE), duration_s=LONG),
-    "sensor": Definition(SENSOR | LAGS, noise_deg_s=NOISY),
-    "whole": Definition(WHOLE, strokes=FOUR, duration_s=LONG, noise_deg_s=NOISY),
-    "whole_similarity": Definition(WHOLE, SIMILAR, strokes=FOUR, duration_s=LONG),
+    "rocking_friction": Definition(ROCKING | FRICTION, strokes=(LOWER, RAISE), duration_s=LONG_STROKE),
+    "balance": Definition(BALANCE | WORM, strokes=(LOWER, RAISE), duration_s=LONG_STROKE),
+    "sensor": Definition(SENSOR | LAG_RANGES, noise_deg_s=NOISY),
+    "whole": Definition(WHOLE_RANGES, strokes=FOUR, duration_s=LONG_STROKE, noise_deg_s=NOISY),
+    "whole_similarity": Definition(WHOLE_RANGES, SIMILAR, strokes=FOUR, duration_s=LONG_STROKE),
 }  # fmt: skip
 """Name -> problem, in the order of the suite; a change of one of them changes VERSION."""
 
@@ -147,7 +147,7 @@ def suite(
     >>> len(problems), problems[0].name, problems["whole/15"].n_var
     (360, 'arm/1', 14)
     """
-    for what, given, known in (("objectives", objectives, OBJECTIVES), ("units", units, UNITS)):
+    for what, given, known in (("objectives", objectives, OBJECTIVES), ("units", units, UNITS_OF_PARAMETERS)):
         if given not in known:
             raise ArmidError(f"{what} is {given!r}, {nearest(str(given), known)}")
     names = [name for name, d in DEFINITIONS.items() if objectives == "one" or len(d.strokes) > 1]
@@ -277,7 +277,7 @@ class SuiteProblem(Problem):  # type: ignore[misc]
         """The truth, SI, and the generator from which the noise is drawn next."""
         words = f"{self.problem_name} {self.version} {self.instance}".encode()
         rng = np.random.default_rng(np.frombuffer(hashlib.sha256(words).digest(), dtype="<u4"))
-        share = MARGIN + (1.0 - 2.0 * MARGIN) * rng.random(self.n_var)
+        share = MARGIN_OF_TRUTH + (1.0 - 2.0 * MARGIN_OF_TRUTH) * rng.random(self.n_var)
         return self._low + share * (self._high - self._low), rng
 
     @cached_property
@@ -369,7 +369,7 @@ class SuiteProblem(Problem):  # type: ignore[misc]
         shifts = 1e-4 * np.eye(self.n_var)
         slopes = self._residuals(truth + shifts) - self._residuals(truth - shifts)
         widths = np.linalg.svd(slopes, compute_uv=False)
-        points, directions = rng.random((N_STEPS, self.n_var)), rng.standard_normal((N_STEPS, self.n_var))
+        points, directions = rng.random((N_OF_GRID, self.n_var)), rng.standard_normal((N_OF_GRID, self.n_var))
         directions /= np.linalg.norm(directions, axis=1, keepdims=True)
         here, near, far = (self._values(np.clip(points + step * directions, 0.0, 1.0)) for step in (0.0, 1e-3, 0.05))
         finite = np.isfinite([here, near, far]).all(axis=0)
@@ -386,7 +386,7 @@ class SuiteProblem(Problem):  # type: ignore[misc]
     def difficulty(self) -> str:
         """The first class whose limit the landscape exceeds: stair, plateau, rugged, valley; else smooth."""
         of = self.landscape
-        return next((name for name, measure, limit in CLASSES if of[measure] > limit), "smooth")
+        return next((name for name, measure, limit in CLASSES_OF_FORMS if of[measure] > limit), "smooth")
 
 
 class MeasuredProblem(SuiteProblem):

@@ -17,7 +17,7 @@ from armid.errors import ArmidError, DataError, caused_by, nearest, quoted
 from armid.model import EFFECTS, PLANTS, Array, Effect, Model, Output, Parameter, Plant, fitting_form
 from armid.model.effects.sensor import sensor_effects
 from armid.model.parameter import resolve, warn_if_far
-from armid.record.reader import NAME, SUFFIX, campaign_path, gravity_of, record_of, record_path
+from armid.record.reader import CAMPAIGN_FILE, CSV_SUFFIX, campaign_path, gravity_of, record_of, record_path
 from armid.record.record import Record, RecordWarning
 from armid.record.resample import with_window
 from armid.record.schema import CampaignSheet, Known, Override, RecordSheet, load_toml, unknown_name, validated
@@ -31,9 +31,9 @@ if TYPE_CHECKING:
     from armid.report.document import Document
 
 # Records of each role that a campaign's repr names.
-MOST_NAMED = 8
+MOST_RECORDS_NAMED = 8
 # What [tolerances] of a file says of every constant that it does not name.
-DEFAULT = "default"
+DEFAULT_TOLERANCE = "default"
 # From this tolerance on a value is one to be found rather than one that is known.
 ROUGH = 0.1
 
@@ -71,8 +71,9 @@ class Campaign(Shown):
 
     def __repr__(self) -> str:
         named = {role: [r.file for r in self.records if r.role == role] for role in ("train", "holdout")}
-        records = "; ".join(f"{len(files)} {role}: {', '.join(files[:MOST_NAMED])}{', ...' * (len(files) > MOST_NAMED)}"
-                            for role, files in named.items())  # fmt: skip
+        shown = {role: [*files[:MOST_RECORDS_NAMED], *["..."][: len(files[MOST_RECORDS_NAMED:])]]
+                 for role, files in named.items()}  # fmt: skip
+        records = "; ".join(f"{len(named[role])} {role}: {', '.join(files)}" for role, files in shown.items())
         return f"<Campaign {self.name} of {self.plant.name} [{self.unit}]; {records}>"
 
     def document(self) -> "Document":
@@ -246,7 +247,7 @@ def campaign_of(
         tolerances={name: t for name, t in tolerances.items() if name not in fixed and name in sized},
         rough={name: t for name, t in tolerances.items() if t >= ROUGH and name in sized},
         taken_as_exact=tuple(c.name for c in plant.constants if c.tolerance is None and c.name in sized
-                             and not {c.name, DEFAULT} & {*sheet.tolerances, *set_by_records(plant)}),
+                             and not {c.name, DEFAULT_TOLERANCE} & {*sheet.tolerances, *set_by_records(plant)}),
         unmeasured=tuple(o for o in whole.outputs if o.name not in recorded),
         chances=chances,
         truth=dict(sheet.truth),
@@ -283,7 +284,7 @@ def write_campaign(out: str | Path, campaign_toml: str, tables: Mapping[str, Map
         raise ArmidError(f"{quoted(str(out))} exists already, a new or empty folder is expected")
     try:
         with NewFiles(folder) as files:
-            files.path(NAME).write_text(campaign_toml, encoding="utf-8")
+            files.path(CAMPAIGN_FILE).write_text(campaign_toml, encoding="utf-8")
             for file, columns in tables.items():
                 write_table(files.path(file), columns)
     except OSError as error:
@@ -299,18 +300,18 @@ def warned_once(kind: type[Warning] = RecordWarning) -> Iterator[None]:
         yield
     alike: dict[str, list[tuple[str, str, type[Warning]]]] = {}
     for warning in caught:
-        file, dot, said = str(warning.message).partition(f"{SUFFIX}: ")
+        file, dot, said = str(warning.message).partition(f"{CSV_SUFFIX}: ")
         key = re.sub(r"\d[\d.e+-]*", "", said) if dot else file
         alike.setdefault(key, []).append((f"{file}{dot.removesuffix(': ')}", said, warning.category))
     for (first, said, category), *others in alike.values():
         names = [file.rpartition("/")[2] for file, _, _ in others]
-        more = f" and {len(names) - MOST_NAMED} more" if len(names) > MOST_NAMED else ""
+        more = f" and {len(names) - MOST_RECORDS_NAMED} more" if len(names) > MOST_RECORDS_NAMED else ""
         if not said:
             sentence = first
         elif all(also == said for _, also, _ in others):
-            sentence = f"{', '.join([first, *names[:MOST_NAMED]])}{more}: {said}"
+            sentence = f"{', '.join([first, *names[:MOST_RECORDS_NAMED]])}{more}: {said}"
         else:
-            sentence = f"{first}: {said}; the same with other numbers: {', '.join(names[:MOST_NAMED])}{more}"
+            sentence = f"{first}: {said}; the same with other numbers: {', '.join(names[:MOST_RECORDS_NAMED])}{more}"
         warnings.warn(sentence, category, stacklevel=5)
 
 
@@ -381,11 +382,11 @@ def tolerances_of(
     """
     declared = {**dict.fromkeys(fixed), **{c.name: c.tolerance for c in plant.constants}}
     for name in told:
-        if name not in declared and name != DEFAULT:
-            raise unknown_name("constant", name, [*declared, DEFAULT], f"{where}, tolerances")
+        if name not in declared and name != DEFAULT_TOLERANCE:
+            raise unknown_name("constant", name, [*declared, DEFAULT_TOLERANCE], f"{where}, tolerances")
     of_records, tolerances = set_by_records(plant), {}
     for name, usual in declared.items():
-        otherwise = 0.0 if usual == 0.0 or name in of_records else told.get(DEFAULT, usual or 0.0)
+        otherwise = 0.0 if usual == 0.0 or name in of_records else told.get(DEFAULT_TOLERANCE, usual or 0.0)
         tolerances[name] = told.get(name, otherwise)
     return {name: tolerance for name, tolerance in tolerances.items() if tolerance > 0.0}
 

@@ -16,7 +16,7 @@ from armid.errors import ArmidError, quoted
 from armid.model import Array
 from armid.units import UNIT_ENDS
 
-NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
+CELL_NUMBER = re.compile(r"\s*[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*", re.ASCII)
 COLUMN = re.compile(r"([+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\n)*", re.ASCII)
 # A number with one comma for its point, and one with separators of thousands or the same digits with decimals.
 COMMA = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?", re.ASCII)
@@ -63,7 +63,7 @@ def cells_of(text: str, wide: bool, file: str) -> Cells:
     split = [(number, cells_in(line, separator, f"{file}, line {number}")) for number, line in kept]
     header_line, names = split[0]
     body = split[1:]
-    if all(NUMBER.fullmatch(cell) for cell in names) and comments and comments[-1][0] < header_line:
+    if all(CELL_NUMBER.fullmatch(cell) for cell in names) and comments and comments[-1][0] < header_line:
         above = cells_in(re.sub(r"^\s*(#|%|//)\s*", "", comments[-1][1]), separator, file)
         if len(above) == len(names):
             header_line, names, body = comments[-1][0], above, split
@@ -108,7 +108,7 @@ def check_names(names: Sequence[str], line: int, file: str) -> None:
                          "expected")  # fmt: skip
     if len(names) == 1 and " " in names[0]:
         raise ArmidError(f"{where}: one column {quoted(names[0])} is there, columns separated by commas are expected")
-    if all(NUMBER.fullmatch(name) for name in names):
+    if all(CELL_NUMBER.fullmatch(name) for name in names):
         raise ArmidError(f"{where}: numbers are there, and no header: a line of names such as "
                          "'time_s,angular_velocity_deg_s' is expected above them")  # fmt: skip
     for i, name in enumerate(names):
@@ -157,7 +157,7 @@ def units_in(cells: Sequence[str]) -> list[str]:
     """Return the unit of each column where a row holds units and no number, else an empty list."""
     bare = [cell.strip("[]() ") for cell in cells]
     known = [unit in UNIT_ENDS for unit in bare]
-    words = all(not NUMBER.fullmatch(c) and not COMMA.fullmatch(c) and (k or c.lower() not in NO_NUMBER or not c)
+    words = all(not CELL_NUMBER.fullmatch(c) and not COMMA.fullmatch(c) and (k or c.lower() not in NO_NUMBER or not c)
                 for c, k in zip(bare, known, strict=True))  # fmt: skip
     return bare if any(known) and words else []
 
@@ -182,14 +182,14 @@ def has_decimal_comma(rows: Sequence[Sequence[str]], separator: str, lines: Sequ
     """
     sign = ","
     marked = [(number, c) for number, cells in zip(lines, rows, strict=True) for c in cells if COMMA.fullmatch(c)]
-    pointed = any("." in c and NUMBER.fullmatch(c) for cells in rows for c in cells)
+    pointed = any("." in c and CELL_NUMBER.fullmatch(c) for cells in rows for c in cells)
     if pointed or not marked:
         if separator == "," or marked:
             return False
         # in a file that a program of a language with decimal commas may have written, 1.234 may be a thousand
         sign = "."
         marked = [(number, c) for number, cells in zip(lines, rows, strict=True) for c in cells if "." in c]
-        marked = [(number, c) for number, c in marked if NUMBER.fullmatch(c) or THOUSANDS.fullmatch(c)]
+        marked = [(number, c) for number, c in marked if CELL_NUMBER.fullmatch(c) or THOUSANDS.fullmatch(c)]
     if marked and all(THOUSANDS.fullmatch(c) for _, c in marked):
         number, cell = marked[0]
         arguments = f"sep={separator!r}, decimal={sign!r}".replace("'", '"')
@@ -206,5 +206,5 @@ def columns_of(cells: Cells) -> Iterator[tuple[str, Array | tuple[int, str]]]:
             yield name, np.array(column, dtype=np.float64)
             continue
         filled = ["nan" if cell.lower() in NO_NUMBER else cell for cell in column]
-        wrong = next((i for i, cell in enumerate(filled) if cell != "nan" and not NUMBER.fullmatch(cell)), None)
+        wrong = next((i for i, cell in enumerate(filled) if cell != "nan" and not CELL_NUMBER.fullmatch(cell)), None)
         yield name, np.array(filled, dtype=np.float64) if wrong is None else (cells.lines[wrong], column[wrong])

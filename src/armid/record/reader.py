@@ -16,9 +16,9 @@ from armid.record.sensor import InputNoise, noise_of_input
 from armid.record.signal import signal_of
 from armid.record.start import Track, n_spent, state_at, state_shown, track_of
 from armid.record.table import (
-    LARGEST,
+    LARGEST_CELL,
     POSITIONS,
-    TIME,
+    TIME_HEADER,
     CsvTable,
     input_columns,
     output_columns,
@@ -27,8 +27,8 @@ from armid.record.table import (
 )
 from armid.units import DEGREE, SUFFIXES
 
-NAME, SUFFIX = "campaign.toml", ".csv"
-POSITION, SPEED = "start_position", "start_speed"
+CAMPAIGN_FILE, CSV_SUFFIX = "campaign.toml", ".csv"
+POSITION, START_SPEED = "start_position", "start_speed"
 KEY_ROUNDING = 1e-9
 SATURATED_SAMPLES = 5
 
@@ -52,7 +52,7 @@ def record_of(table: CsvTable, sheet: RecordSheet, campaign: CampaignSheet, plan
     measured = [read(header, o.factors[header], o.unit, o.name) for o, header in outputs.items()]
     if campaign.gyro_range_deg_s is not None:
         check_range(measured, campaign.gyro_range_deg_s, table)
-    others = {name: values for name, values in table.columns.items() if name not in (TIME, *outputs.values())}
+    others = {name: values for name, values in table.columns.items() if name not in (TIME_HEADER, *outputs.values())}
     columns = {name: onto_grid(values, times, timing) for name, values in others.items() if np.isfinite(values).all()}
     manoeuvre = manoeuvre_of(plant, campaign, sheet, table, timing, sources, where=where)
     record = Record(
@@ -90,7 +90,7 @@ def manoeuvre_of(
             inputs[driven.name] = np.full(timing.n_samples, driven.default)
         else:
             values = table.numbers(header) * input_factor(header, driven.unit, table)
-            inputs[driven.name] = onto_grid(values, table.columns[TIME], timing, driven.hold or hold)
+            inputs[driven.name] = onto_grid(values, table.columns[TIME_HEADER], timing, driven.hold or hold)
     return Manoeuvre(timing.interval, timing.n_samples, constants, inputs, hold, timing.start)
 
 
@@ -185,7 +185,7 @@ def tracks_of(
     (speed,) = record.signals
     declared = {c.name for c in plant.constants}
     header = position_of(table, record.unit)
-    tracks = {SPEED: track_of(speed)} if SPEED in declared else {}
+    tracks = {START_SPEED: track_of(speed)} if START_SPEED in declared else {}
     if POSITION in declared and header is not None:
         unit = "rad" if record.unit == "rad/s" else "m"
         tracks[POSITION] = track_of(read(header, POSITIONS[header][1], unit))
@@ -211,7 +211,7 @@ def record_constants(plant: Plant, shared: Mapping[str, float], sheet: RecordShe
                 kind = "a parameter" if is_parameter else "no constant"
                 hint = f"[parameters.{name}] with fixed = VALUE is expected" if is_parameter else nearest(name, known)
                 raise ArmidError(f"{where}: {quoted(name)} in {what} is {kind} of plant '{plant.name}', {hint}")
-            if not plant.from_rest and plant.records_one_speed and name in (POSITION, SPEED):
+            if not plant.from_rest and plant.records_one_speed and name in (POSITION, START_SPEED):
                 raise ArmidError(f"{where}: '{name}' in {what} is set, but it comes from the first samples of a "
                                  "record: another constant is expected")  # fmt: skip
     own = {k.constant: key_value(k, sheet.keys[k.key], where) for k in plant.keys if k.key in sheet.keys}
@@ -248,8 +248,8 @@ def check_key(key: ManoeuvreKey, constants: Mapping[str, float], where: str) -> 
     if key.unlike and constants[key.constant] == constants.get(key.unlike):
         raise ArmidError(f"{where}: {key.key} is {value:.9g}, where the record starts: a motion is expected")
     slack = KEY_ROUNDING * abs(value)
-    low = key.low if key.low is not None else -LARGEST / abs(key.factor)
-    high = key.high if key.high is not None else LARGEST / abs(key.factor)
+    low = key.low if key.low is not None else -LARGEST_CELL / abs(key.factor)
+    high = key.high if key.high is not None else LARGEST_CELL / abs(key.factor)
     if not low - slack <= value <= high + slack or (key.boolean and value not in (0.0, 1.0)):
         raise ArmidError(f"{where}: {key.key} is {value:.9g}, {range_of(key)} is expected")
 
@@ -266,25 +266,29 @@ def range_of(key: ManoeuvreKey) -> str:
 
 def campaign_path(path: str | Path) -> Path:
     if not os.path.exists(path):
-        raise ArmidError(f"campaign {quoted(str(path))} does not exist, a folder with a {NAME} is expected")
+        raise ArmidError(f"campaign {quoted(str(path))} does not exist, a folder with a {CAMPAIGN_FILE} is expected")
     if os.path.isfile(path):
-        if Path(path).suffix.lower() == SUFFIX:
-            raise ArmidError(f"campaign {quoted(str(path))} is a record, the folder with its {NAME} is expected")
+        if Path(path).suffix.lower() == CSV_SUFFIX:
+            raise ArmidError(
+                f"campaign {quoted(str(path))} is a record, the folder with its {CAMPAIGN_FILE} is expected"
+            )
         return Path(path)
-    if not os.path.isfile(os.path.join(path, NAME)):
-        raise ArmidError(f"campaign {quoted(str(path))} holds no {NAME}, a folder with one is expected")
-    return Path(path) / NAME
+    if not os.path.isfile(os.path.join(path, CAMPAIGN_FILE)):
+        raise ArmidError(f"campaign {quoted(str(path))} holds no {CAMPAIGN_FILE}, a folder with one is expected")
+    return Path(path) / CAMPAIGN_FILE
 
 
 def record_path(folder: Path, file: str, where: str) -> Path:
     pure = PurePosixPath(file.replace("\\", "/"))
     if pure.is_absolute() or PureWindowsPath(file).drive or ".." in pure.parts:
         raise ArmidError(f"{where}: file {quoted(file)} leads out of the campaign's folder, a file inside is expected")
-    if pure.suffix.lower() != SUFFIX or not file.isprintable():
-        raise ArmidError(f"{where}: file {quoted(file)} is not a CSV file, a name that ends in {SUFFIX} is expected")
+    if pure.suffix.lower() != CSV_SUFFIX or not file.isprintable():
+        raise ArmidError(
+            f"{where}: file {quoted(file)} is not a CSV file, a name that ends in {CSV_SUFFIX} is expected"
+        )
     path = os.path.join(folder, file)
     if not os.path.isfile(path):
-        files = sorted(p.name for p in folder.glob(f"*{SUFFIX}") if p.is_file())
+        files = sorted(p.name for p in folder.glob(f"*{CSV_SUFFIX}") if p.is_file())
         if os.path.lexists(path):
             raise ArmidError(f"{where}: file {quoted(file)} does not exist: a folder or a dead link has that name, a "
                              "CSV file is expected")  # fmt: skip

@@ -16,10 +16,10 @@ FEWEST_SAMPLES = 20
 SHORTEST_INTERVAL = 1e-9
 LATEST_START = 2.0
 MOST_FILLING = 10
-EVEN = 1e-3
+EVEN_TIMES = 1e-3
 LARGE_GAP = 3.0
 # A row this near to a grid sample, in intervals, is that sample.
-NEAR = 0.75
+NEAR_SAMPLE = 0.75
 NEIGHBOURS = 7
 
 
@@ -56,7 +56,7 @@ def timing_of(times: Array, from_rest: bool, file: str) -> Timing:
     first = 0
     if from_rest:
         # a thousandth of an interval before t = 0 counts as 0
-        slack = EVEN * float(np.median(np.diff(times))) if times.size > 1 else 0.0
+        slack = EVEN_TIMES * float(np.median(np.diff(times))) if times.size > 1 else 0.0
         first = int(np.searchsorted(times, -slack))
     motion = times[first:]
     check_number(motion.size, from_rest, file)
@@ -69,7 +69,7 @@ def timing_of(times: Array, from_rest: bool, file: str) -> Timing:
     n_samples = grid_size(motion, start, interval, file) if resampled else motion.size
     check_number(n_samples, from_rest, file)
     # a plant from rest may have lost its sample at t = 0; an axis may begin before 0, and what is before 0 never counts
-    earliest = 0 if from_rest and first > 0 else int(np.ceil((max(begin, 0.0) - start) / interval - EVEN))
+    earliest = 0 if from_rest and first > 0 else int(np.ceil((max(begin, 0.0) - start) / interval - EVEN_TIMES))
     irregularity = None if even else irregularity_of(motion)
     if irregularity is not None:
         share, widest = irregularity.share, irregularity.largest_gap
@@ -95,7 +95,7 @@ def fitted_grid(times: Array, file: str) -> tuple[float, float, bool]:
     if interval < SHORTEST_INTERVAL:
         raise ArmidError(f"{file}: the samples are {interval:.3g} s apart, at least {SHORTEST_INTERVAL:g} s is "
                          "expected")  # fmt: skip
-    tolerance = max(EVEN * interval, 0.75 * printed_resolution(times, interval))
+    tolerance = max(EVEN_TIMES * interval, 0.75 * printed_resolution(times, interval))
     off = float(np.max(np.abs(times - middle - interval * index)))
     even = off <= tolerance
     # where only jitter is there, each row has its own sample of the grid
@@ -123,7 +123,7 @@ def irregularity_of(times: Array) -> Irregularity | None:
     intervals = np.diff(times)
     median = float(np.median(intervals))
     relative = intervals / median
-    if np.max(np.abs(relative - 1)) <= EVEN + 1.01 * printed_resolution(times, median) / median:
+    if np.max(np.abs(relative - 1)) <= EVEN_TIMES + 1.01 * printed_resolution(times, median) / median:
         return None
     widest = int(np.argmax(relative))
     return Irregularity(float(np.mean(np.abs(relative - 1) > 0.01)), float(relative[widest]), float(times[widest]))
@@ -152,7 +152,7 @@ def onto_grid(values: Array, times: Array, timing: Timing, hold: str = "linear")
     if hold != "zero":
         return np.asarray(np.interp(grid, times, values), dtype=np.float64)
     # a sample counts from a thousandth of an interval before its time on, so that rounding does not delay it
-    edges = np.append(grid, grid[-1] + timing.interval) + EVEN * timing.interval
+    edges = np.append(grid, grid[-1] + timing.interval) + EVEN_TIMES * timing.interval
     rows = np.maximum(np.searchsorted(times, edges, side="right") - 1, 0)
     first, last = rows[:-1], rows[1:]
     impulse = np.append(0.0, np.cumsum(values[:-1] * np.diff(times)))
@@ -175,11 +175,11 @@ def moved_onto_grid(values: Array, times: Array, timing: Timing, rows: Mask) -> 
     grid = timing.grid()
     right, nearest = around(times, grid)
     along = grid - times[nearest]
-    data = rows[nearest] & (np.abs(along) <= NEAR * timing.interval)
+    data = rows[nearest] & (np.abs(along) <= NEAR_SAMPLE * timing.interval)
     if times.size < NEIGHBOURS:
         return onto_grid(known, times, timing), data
     moved = known[nearest] + parabola_slopes(known, times, nearest) * along
-    gap = np.maximum(np.abs(along), times[right] - times[right - 1] - timing.interval) > NEAR * timing.interval
+    gap = np.maximum(np.abs(along), times[right] - times[right - 1] - timing.interval) > NEAR_SAMPLE * timing.interval
     return np.where(gap, np.interp(grid, times, known), moved), data
 
 
@@ -188,7 +188,7 @@ def gap_samples(times: Array, timing: Timing) -> Mask:
     if not timing.resampled:
         return np.zeros(timing.n_samples, dtype=np.bool_)
     grid = timing.grid()
-    return np.asarray(np.abs(grid - times[around(times, grid)[1]]) > NEAR * timing.interval)
+    return np.asarray(np.abs(grid - times[around(times, grid)[1]]) > NEAR_SAMPLE * timing.interval)
 
 
 def around(times: Array, grid: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from armid.errors import ArmidError, nearest, quoted
 from armid.model import ManoeuvreKey
-from armid.record.table import LARGEST
+from armid.record.table import LARGEST_CELL
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -61,7 +61,7 @@ def part(kind: Kind, value: object, path: str) -> Any:
 @kind(type="number")
 def number(value: object) -> float:
     # in Python a bool is an int too
-    if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST:
+    if isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= LARGEST_CELL:
         return float(value)
     raise KindError(value)
 
@@ -218,17 +218,19 @@ LARGEST_TOML = 2_000_000
 # the squared numbers of dots over all lines at most. A list of 3,000 names of files on one line stays below it.
 MOST_SQUARED_DOTS = 10_000_000
 # Records are held in memory, one by one.
-MOST_RECORDS = 10_000
+MOST_RECORDS_READ = 10_000
 HOLD = key(one_of("linear", "zero"), "'linear' or 'zero'", "How an input runs between its samples.")
-CONSTANTS = key(table_of(number), "a finite number in SI", "Constants of the plant, by name.")
-TOLERANCES = key(
+CONSTANTS_KEY = key(table_of(number), "a finite number in SI", "Constants of the plant, by name.")
+TOLERANCES_KEY = key(
     table_of(share), "a share from 0 to below 1",
     "Standard deviation of a constant, as a share of its value; `default` holds for those that are not named.",
 )  # fmt: skip
 LOST = key(share, "a share from 0 to below 1", "Share of a record that may be invalid: clipped, frozen or wild.")
 INPUTS = key(table_of(text), "the name of a column", "Which column of the CSV file brings an input of the plant.")
-WINDOW = key(list_of(number, 2, 2), "[begin, end] in seconds", "Part of the record that fitness and errors see.")
-EFFECTS = key(list_of(name_in("effects")), "a list of names of effects", "Effects that the model adds to the plant.")
+WINDOW_KEY = key(list_of(number, 2, 2), "[begin, end] in seconds", "Part of the record that fitness and errors see.")
+EFFECTS_KEY = key(
+    list_of(name_in("effects")), "a list of names of effects", "Effects that the model adds to the plant."
+)
 PLANT = key(name_in("plants"), "the name of a plant", "The declared machine; `armid list plants` shows them.")
 
 
@@ -241,9 +243,9 @@ class RecordSheet:
         one_of("train", "holdout"), "'train' or 'holdout'",
         "Whether parameters are searched on this record, or it judges the result.",
     ))  # fmt: skip
-    constants: Mapping[str, float] = field(default_factory=dict, metadata=CONSTANTS)
+    constants: Mapping[str, float] = field(default_factory=dict, metadata=CONSTANTS_KEY)
     inputs: Mapping[str, str] = field(default_factory=dict, metadata=INPUTS)
-    window_s: tuple[float, float] | None = field(default=None, metadata=WINDOW)
+    window_s: tuple[float, float] | None = field(default=None, metadata=WINDOW_KEY)
     restart_s: float | None = field(default=None, metadata=key(
         above_zero, "a length in seconds above 0",
         "Simulate pieces of this length, each from the measured state, where a longer motion cannot be followed.",
@@ -284,10 +286,10 @@ class CampaignSheet:
     name: str = field(metadata=key(text, "a text", "The name of the campaign on its pages."))
     plant: str = field(metadata=PLANT)
     records: tuple[dict[str, Any], ...] = field(metadata=key(
-        list_of(table_for(RecordSheet), 1, MOST_RECORDS), f"1 to {MOST_RECORDS:,} tables headed [[records]]",
+        list_of(table_for(RecordSheet), 1, MOST_RECORDS_READ), f"1 to {MOST_RECORDS_READ:,} tables headed [[records]]",
         "One table for each CSV file.",
     ))  # fmt: skip
-    effects: tuple[str, ...] = field(default=(), metadata=EFFECTS)
+    effects: tuple[str, ...] = field(default=(), metadata=EFFECTS_KEY)
     gyro_range_deg_s: float | None = field(
         default=None,
         metadata=key(above_zero, "a range in deg/s above 0", "Range of the gyro; speeds beyond it are cut off."),
@@ -296,8 +298,8 @@ class CampaignSheet:
         Kind(table_of(any_table).read, table_of(one_kind(table_for(Override), table_of(table_for(Override)))).schema),
         "a table of low, high, fixed", "What replaces the declaration of a parameter, SI.",
     ))  # fmt: skip
-    constants: Mapping[str, float] = field(default_factory=dict, metadata=CONSTANTS)
-    tolerances: Mapping[str, float] = field(default_factory=dict, metadata=TOLERANCES)
+    constants: Mapping[str, float] = field(default_factory=dict, metadata=CONSTANTS_KEY)
+    tolerances: Mapping[str, float] = field(default_factory=dict, metadata=TOLERANCES_KEY)
     priors: Mapping[str, Any] = field(default_factory=dict, metadata=key(
         table_of(one_kind(probability, table_for(Known))),
         "the probability of an effect, between 0 and 1, or { mean, sd } of a parameter or constant, SI",

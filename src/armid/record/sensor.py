@@ -22,13 +22,13 @@ NEARLY_ALL = 0.98
 # How far from a multiple of the step a value may lie, in steps: printed numbers are rounded once more.
 OFF_STEP = 0.05
 # Steps that the closest two values may be apart, and the gaps between values that make a finer step no chance.
-MOST_PARTS, FEWEST_GAPS = 3, 8
+MOST_STEPS_APART, FEWEST_GAPS = 3, 8
 # Changes of the value from which a hold is found.
 FEWEST_CHANGES = 20
 # Renewals after which clocks that differ have drifted: longer pauses tell nothing of a hold.
 MOST_RENEWALS = 3.5
 # This share of all changes comes within a quarter of a hold of a multiple of it: by chance only half of them do.
-ON_TIME, QUARTER = 0.9, 0.25
+ON_TIME, QUARTER_STEP = 0.9, 0.25
 # ... and at least this share of the changes differs from a single step onward: a slow motion makes such steps.
 UNLIKE_SLOW_MOTION = 0.2
 
@@ -82,7 +82,7 @@ def step_of(values: Array) -> float:
     if not gaps.size or float(np.sum(rounding)) > 1e-3 * float(np.sum(gaps)):
         return 0.0
     # among few values the closest two may be two or three steps apart
-    for parts in range(1, MOST_PARTS + 1 if gaps.size >= FEWEST_GAPS else 2):
+    for parts in range(1, MOST_STEPS_APART + 1 if gaps.size >= FEWEST_GAPS else 2):
         counts = np.rint(gaps * parts / np.min(gaps))
         step = float(np.sum(gaps) / np.sum(counts))
         if np.all(np.abs(gaps - counts * step) <= OFF_STEP * step):
@@ -106,7 +106,7 @@ def hold_of(values: Array) -> int:
     if hold < 3.0 and hold != 2.0:
         return 1
     short = apart[apart < MOST_RENEWALS * hold]
-    on_time = np.abs(short / hold - np.maximum(np.rint(short / hold), 1.0)) < QUARTER
+    on_time = np.abs(short / hold - np.maximum(np.rint(short / hold), 1.0)) < QUARTER_STEP
     if float(np.mean(on_time)) < ON_TIME or 2 * short.size < apart.size:
         return 1
     single = 1.5 * float(np.min(np.abs(changes)))
@@ -132,7 +132,7 @@ def renewed(values: Array, hold: int) -> Mask:
 FEWEST_REST_SAMPLES = 50
 # At rest a sensor whose noise is below this share of its step shows more or less of it, as the step falls. The motion
 # tells it where its differences of neighbouring orders agree to such a share: there is no motion in them.
-HIDDEN, AGREEMENT = 0.6, 0.15
+HIDDEN_NOISE, AGREEMENT = 0.6, 0.15
 # A rest between motions: a speed is this small against its largest value, and mean and size of the values move by so
 # many of their standard errors at most from one half to the other. Of a longer pause the later parts are tried, as a
 # machine runs down.
@@ -166,7 +166,7 @@ def noise_of(rest: Array, motion: Array, interval: float, times: Array | None = 
     floor = max(step, float(np.spacing(size))) / np.sqrt(12.0)
     is_short = rest.size < FEWEST_REST_SAMPLES
     is_equal = is_short or np.ptp(rest) == 0.0
-    if is_equal or np.std(rest) < HIDDEN * step:
+    if is_equal or np.std(rest) < HIDDEN_NOISE * step:
         apart, agrees = noise_in_motion(motion, times)
         # Of a slow motion the steps alone look like up to twice their noise; what a step hides is less than a step.
         is_shown = apart > 2.0 * floor if is_equal else floor < apart <= step

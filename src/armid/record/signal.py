@@ -32,7 +32,7 @@ TURN_ROUNDING = 1e-6
 BRIDGED = 2
 # An output without a number in more than this share of the rows is not a measurement of the record.
 MOST_EMPTY = 0.5
-WORDS = {"clipped": "are at the limit of the sensor", "stuck": "are repeated while the signal leaps",
+BROKEN_WORDS = {"clipped": "are at the limit of the sensor", "stuck": "are repeated while the signal leaps",
          "spikes": "are far from their neighbours"}  # fmt: skip
 # Share of a turn that an angle which wraps spans at least.
 SPANNED = 0.75
@@ -160,8 +160,8 @@ def check_lost(table: CsvTable, header: str, faults: Sequence[Broken], n_new: in
     if n > most * n_new:
         worst = max(faults, key=lambda fault: fault.count)
         raise ArmidError(f"{table.file}, line {worst.line}: {n / n_new:.1%} of the samples of {header} are no data, "
-                         f"most of them {WORDS[worst.kind]}: at most {most:.0%} are expected, in a new recording or "
-                         "with another most_lost of the record")  # fmt: skip
+                         f"most of them {BROKEN_WORDS[worst.kind]}: at most {most:.0%} are expected, in a new "
+                         "recording or with another most_lost of the record")  # fmt: skip
 
 
 def gaps(times: Array, timing: Timing) -> list[Broken]:

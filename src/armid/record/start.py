@@ -13,7 +13,7 @@ from armid.record.record import Signal
 State = tuple[dict[str, float], dict[str, float]]
 # Of a record that is held out, the start comes from this share of its first samples, at most so long [s], at least so
 # many samples; they do not judge.
-SHARE, LONGEST_S, FEWEST = 0.05, 0.5, 5
+SHARE_OF_START, LONGEST_S, FEWEST_OF_START = 0.05, 0.5, 5
 STEPS, TINY = 4, 1e-6
 
 
@@ -45,7 +45,7 @@ def state_at(tracks: Mapping[str, Track], index: int) -> State:
 
 def n_spent(n_samples: int, interval: float) -> int:
     """Return from how many first samples of a record (or piece) that is held out its start is taken."""
-    return max(int(np.ceil(min(SHARE * n_samples, LONGEST_S / interval))), FEWEST)
+    return max(int(np.ceil(min(SHARE_OF_START * n_samples, LONGEST_S / interval))), FEWEST_OF_START)
 
 
 def state_shown(
@@ -129,7 +129,7 @@ DEGREES = (1, 2)
 HIGHER = 2
 # Standard deviations by which squares may exceed those of the noise.
 BY_CHANCE = 3.0
-GROWTH, LONGEST = 1.25, 400
+WINDOW_GROWTH, LONGEST_WINDOW = 1.25, 400
 
 
 def smoothed(values: Array, index: int, noise: float, slope: bool = False) -> tuple[float, float]:
@@ -144,17 +144,17 @@ def smoothed(values: Array, index: int, noise: float, slope: bool = False) -> tu
     """
     best = float(values[index]), noise
     if slope:
-        low, n = window_at(index, FEWEST, values.size), min(FEWEST, values.size)
+        low, n = window_at(index, FEWEST_OF_START, values.size), min(FEWEST_OF_START, values.size)
         row = polynomials(n, n - 1, slope)[index - low] @ polynomials(n, n - 1).T
         best = float(row @ values[low : low + n]), noise * float(np.sqrt(row @ row))
     for degree in DEGREES:
         n = degree + HIGHER + 2
-        while n <= min(values.size, LONGEST):
+        while n <= min(values.size, LONGEST_WINDOW):
             low = window_at(index, n, values.size)
             estimate = fitted(values[low : low + n], index - low, degree, noise, slope)
             if estimate is not None:
                 best = min(best, estimate, key=lambda pair: pair[1])
-            n = int(n * GROWTH) + 1
+            n = int(n * WINDOW_GROWTH) + 1
     return best
 
 

@@ -25,10 +25,10 @@ from armid.units import SUFFIXES, TURN
 if TYPE_CHECKING:
     from pandas import DataFrame
 
-LARGEST = 1e30
+LARGEST_CELL = 1e30
 LONGEST_HEADER = 1 << 16
-TIME = "time_s"
-QUANTITIES = ("angular_velocity", "velocity", "time", "drive", "angle", "position")
+TIME_HEADER = "time_s"
+KNOWN_QUANTITIES = ("angular_velocity", "velocity", "time", "drive", "angle", "position")
 FURTHER = ("_rpm", "_turns", "_turns_s", "_counts", "_counts_s")
 # header of a position -> unit of the speed that it belongs to, factor; counts: see `CsvTable.factor`
 POSITIONS = {"position_m": ("m/s", 1.0)}
@@ -148,10 +148,10 @@ def table_with(
         if isinstance(values, tuple):
             table.texts[name] = values[0], f"{quoted(values[1])}, a finite number"
             continue
-        beyond = np.flatnonzero(np.abs(values) > LARGEST)
+        beyond = np.flatnonzero(np.abs(values) > LARGEST_CELL)
         if beyond.size:
             row = int(beyond[0])
-            expected = f"a number within +-{LARGEST:g}" if np.isfinite(values[row]) else "a finite number"
+            expected = f"a number within +-{LARGEST_CELL:g}" if np.isfinite(values[row]) else "a finite number"
             table.texts[name] = table.line_of(row), f"{values[row]:g}, {expected}"
         else:
             table.columns[name] = values
@@ -186,9 +186,9 @@ def write_table(path: Path, columns: Mapping[str, Array]) -> None:
 
 def time_column(table: CsvTable) -> Array:
     """Return the times [s], (n_rows,); refuse a missing column, and times that do not increase, with ArmidError."""
-    if TIME not in table.headers:
-        raise missing(table, "time column", [TIME])
-    times = table.numbers(TIME)
+    if TIME_HEADER not in table.headers:
+        raise missing(table, "time column", [TIME_HEADER])
+    times = table.numbers(TIME_HEADER)
     wrong = np.flatnonzero(np.diff(times) <= 0)
     if wrong.size:
         before, row = float(times[wrong[0]]), int(wrong[0]) + 1
@@ -278,7 +278,7 @@ def input_columns(plant: Plant, named: Mapping[str, str], table: CsvTable, where
 
 def missing(table: CsvTable, what: str, expected: Sequence[str]) -> ArmidError:
     def quantity_of(header: str) -> str:
-        return next((q for q in QUANTITIES if header == q or header.startswith(f"{q}_")), header)
+        return next((q for q in KNOWN_QUANTITIES if header == q or header.startswith(f"{q}_")), header)
 
     quantities = {quantity_of(name) for name in expected}
     # the other units of a turn make the list too long to read

@@ -145,7 +145,7 @@ def escaped(text: str) -> str:
 # Rows of one float at most: of \footnotesize, under a caption, so many fit a page of `article`.
 MOST_ROWS = 38
 # Text of more letters is broken to a column of this width [pt].
-LONG, BROKEN = 40, 145
+LONG_CELL, BROKEN = 40, 145
 # A box no wider than the text.
 FITTED = r"\resizebox{\ifdim\width>\linewidth\linewidth\else\width\fi}{!}{"
 GREEK = (
@@ -153,7 +153,7 @@ GREEK = (
     "pi", "rho", "sigma", "tau", "phi", "chi", "psi", "omega",
 )  # fmt: skip
 SYMBOL = re.compile(rf"({'|'.join(GREEK)}|[b-zA-Z])(\d*)")
-NUMBER = re.compile(r"([-+]?)(\d+)(?:\.(\d+))?(?:e([-+]?\d+))?")
+LATEX_NUMBER = re.compile(r"([-+]?)(\d+)(?:\.(\d+))?(?:e([-+]?\d+))?")
 
 
 def latex(table: Table) -> str:
@@ -202,8 +202,8 @@ def group_lines(shown: Sequence[Column]) -> list[str]:
 def form(column: Column, texts: Sequence[str]) -> str:
     """Return the type of a column: `S` for numbers, with their digits; long text has a width."""
     if not column.digits:
-        return f"p{{{BROKEN}pt}}" if max(map(len, texts), default=0) > LONG else "l"
-    matches = [m for m in (NUMBER.fullmatch(text.replace(",", "")) for text in texts) if m]
+        return f"p{{{BROKEN}pt}}" if max(map(len, texts), default=0) > LONG_CELL else "l"
+    matches = [m for m in (LATEX_NUMBER.fullmatch(text.replace(",", "")) for text in texts) if m]
     if not matches:
         return "r"
     sign, whole, part, power = (max(len((m[i] or "").lstrip("-+" if i == 4 else "")) for m in matches)
@@ -214,12 +214,12 @@ def form(column: Column, texts: Sequence[str]) -> str:
 def cell_text(cell: Cell, column: Column) -> str:
     if column.digits:
         number = cell.text.replace(",", "")
-        return number if NUMBER.fullmatch(number) else f"{{{latex_text(cell.text)}}}"
+        return number if LATEX_NUMBER.fullmatch(number) else f"{{{latex_text(cell.text)}}}"
     if column.key == "parameter":
         return symbol(cell.text)
     text = latex_text(cell.text)
     # a name of a file has no space to break it at
-    return re.sub(r"(/|\\_|\.)", r"\1\\allowbreak{}", text) if len(cell.text) > LONG else text
+    return re.sub(r"(/|\\_|\.)", r"\1\\allowbreak{}", text) if len(cell.text) > LONG_CELL else text
 
 
 def stacked(header: str) -> str:

@@ -70,7 +70,7 @@ ATTRIBUTES = frozenset(
 # Groups that a slider fades in and out.
 LAYERS = ("before", "after")
 ROUNDED = ("d", "points", "x", "y")
-NUMBER = re.compile(r"-?\d+\.\d+")
+HTML_NUMBER = re.compile(r"-?\d+\.\d+")
 REFERENCE = re.compile(r"url\(\s*#([^)\s]+)\s*\)")
 POINTS_PER_PIXEL = 0.75
 PICTURE = "data:image/png;base64,"
@@ -140,7 +140,7 @@ def allowed(key: str, value: str, element: str, prefix: str, used: set[str]) -> 
         return f"#{prefix}{value[1:]}" if value.startswith("#") else value if picture else None
     if "url(" in REFERENCE.sub("", value).lower():
         return None
-    short = " ".join(NUMBER.sub(shorter, value).split()) if key in ROUNDED else value
+    short = " ".join(HTML_NUMBER.sub(shorter, value).split()) if key in ROUNDED else value
     return REFERENCE.sub(rf"url(#{prefix}\1)", short)
 
 

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
 
     from armid.report.document import Document
 
-DETAILS = "details.json"
+DETAILS_FILE = "details.json"
 # How the name of a folder begins in which files are made before they are moved in.
-BESIDE = ".armid-"
+HIDDEN_PREFIX = ".armid-"
 # Room on a disk without which no search is begun: results take some MB.
 LEAST_ROOM = 3_000_000
 # How a page tells a path whose name is not UTF-8.
@@ -58,7 +58,7 @@ class Kind:
     markdown: str
     module: str
     function: str
-    details: str = DETAILS
+    details: str = DETAILS_FILE
 
     @property
     def figures(self) -> tuple[str, ...]:
@@ -150,7 +150,7 @@ class Result(Shown):
                 save(draw(), *(files.path(f"{name}.{ending}") for ending in endings))
             if details:
                 stored = {"made_by": dict(made_by or {}), **details}
-                files.path(DETAILS).write_text(json.dumps(stored, allow_nan=False) + "\n", encoding="utf-8")
+                files.path(DETAILS_FILE).write_text(json.dumps(stored, allow_nan=False) + "\n", encoding="utf-8")
             document = document_of(files.place, kind, str(folder))
             write_pages(document, kind, files)
         for name in set(kind.figures) - figures.keys():
@@ -205,7 +205,7 @@ class NewFiles:
             raise ArmidError(f"{self.folder} is a file: a folder is expected")
         self._is_new = not self.folder.exists()
         self.folder.mkdir(parents=True, exist_ok=True)
-        self._beside = TemporaryDirectory(dir=self.folder, prefix=BESIDE)
+        self._beside = TemporaryDirectory(dir=self.folder, prefix=HIDDEN_PREFIX)
         return self
 
     @property
@@ -241,7 +241,7 @@ def refuse_unwritable(folder: Path | None, file: str = "") -> None:
             with NewFiles(folder):
                 left = disk_usage(folder).free
         except OSError as error:
-            if BESIDE in str(error.filename):
+            if HIDDEN_PREFIX in str(error.filename):
                 error.filename = str(folder / file)
             raise
         if left < LEAST_ROOM:

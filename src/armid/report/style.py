@@ -25,7 +25,7 @@ DPI = 130
 MANY_MARKS = 1_000
 # Of a title.
 LETTERS_PER_INCH = 9.0
-MOST_POINTS = 1_000
+MOST_VECTOR_POINTS = 1_000
 # Largest ratio of the ends of a logarithmic axis with plain numbers.
 MOST_PLAIN = 300.0
 # Where labels stand outside of a frame [inch]: behind tick labels of six letters.
@@ -57,8 +57,8 @@ WIDTHS = {"single": 3.5, "double": 7.2}
 LETTERS = 8.0
 # Columns of a paper that a figure is being drawn for, "" for a page. In a single one all panels stand in a column,
 # in a double one in two: more would leave no room between their names.
-PRINTED: ContextVar[str] = ContextVar("PRINTED", default="")
-MOST_COLUMNS = {"single": 1, "double": 2}
+PRINTED_WIDTH: ContextVar[str] = ContextVar("PRINTED", default="")
+COLUMNS_OF_WIDTH = {"single": 1, "double": 2}
 # Least share of its height that a figure keeps when it becomes narrower.
 LEAST_HEIGHT_SHARE = 0.62
 # A figure of at most this height keeps it: axis labels and a legend take most of it [inch].
@@ -92,7 +92,7 @@ def look(i: int) -> dict[str, Any]:
 
 def panels(n: int, columns: int, width: float, height: float) -> tuple[Any, list[Any]]:
     plt = pyplot()
-    columns = max(1, min(columns, n, MOST_COLUMNS.get(PRINTED.get(), columns)))
+    columns = max(1, min(columns, n, COLUMNS_OF_WIDTH.get(PRINTED_WIDTH.get(), columns)))
     rows = -(-n // columns)
     size = (width * columns, height * rows)
     figure, axes = plt.subplots(rows, columns, figsize=size, squeeze=False, layout="constrained")
@@ -150,11 +150,11 @@ def save_for_print(draw: Callable[[], Any], path: Path, width: str) -> None:
     import matplotlib as mpl
     from matplotlib.text import Text
 
-    token = PRINTED.set(width)
+    token = PRINTED_WIDTH.set(width)
     try:
         figure = draw()
     finally:
-        PRINTED.reset(token)
+        PRINTED_WIDTH.reset(token)
     figure.suptitle("")
     panels_there = [axis for axis in figure.axes if axis.get_subplotspec() is not None and axis.get_title()]
     if len(panels_there) == 1:
@@ -221,7 +221,7 @@ def svg_text(figure: Any) -> str:
     return text.getvalue()
 
 
-def thinned(values: Array, most: int = MOST_POINTS) -> NDArray[np.intp]:
+def thinned(values: Array, most: int = MOST_VECTOR_POINTS) -> NDArray[np.intp]:
     """Return which samples of a curve are to be drawn, rising: all, or the least and the largest of each interval.
 
     So no peak is lost; both ends are kept. most: points, at least 4.
@@ -243,14 +243,14 @@ def thinned(values: Array, most: int = MOST_POINTS) -> NDArray[np.intp]:
 
 # Where names stand right of the axes, as shares of their width; the distance between two [inch], and the height that
 # an upright panel needs outside its axes [inch].
-BESIDE, SAMPLE, GAP = 1.045, 0.055, 0.012
+BESIDE_AXES, SAMPLE, GAP = 1.045, 0.055, 0.012
 APART_INCH, FRAME_INCH, LEAST_HEIGHT = 0.235, 1.0, 4.6
 # Identifiers that have a colour of their own in a report.
-MOST_NAMED = 6
+MOST_COLOURED = 6
 
 
 def row_names(axis: Any, i: int, names: Sequence[str]) -> None:
-    names_here = i % 2 == 0 or PRINTED.get() == "single"
+    names_here = i % 2 == 0 or PRINTED_WIDTH.get() == "single"
     axis.set_yticks(range(len(names)), names if names_here else [""] * len(names))
 
 
@@ -264,7 +264,7 @@ def legend_below(figure: Any, ncols: int, handles: Sequence[Any] | None = None) 
     if handles is None:
         handles = figure.axes[0].get_legend_handles_labels()[0]
     labels = [handle.get_label() for handle in handles]
-    if PRINTED.get() == "single":
+    if PRINTED_WIDTH.get() == "single":
         ncols = 1
         figure.set_figheight(figure.get_figheight() + LEGEND_INCH * len(labels))
     figure.legend(handles, labels, loc="outside lower center", ncols=ncols, frameon=False)
@@ -286,14 +286,16 @@ def named_lines(axis: Any, x: ArrayLike, lines: Mapping[str, ArrayLike], colours
 
 def legend_rows(colours: Mapping[str, int]) -> list[tuple[str, int]]:
     """Return name and number of each row of a legend in the order of the colours; all that are grey share a row."""
-    rows = sorted(((name, i) for name, i in colours.items() if i < MOST_NAMED), key=lambda row: row[1])
+    rows = sorted(((name, i) for name, i in colours.items() if i < MOST_COLOURED), key=lambda row: row[1])
     n_others = len(colours) - len(rows)
-    return [*rows, (f"others ({n_others})", MOST_NAMED)] if n_others else rows
+    return [*rows, (f"others ({n_others})", MOST_COLOURED)] if n_others else rows
 
 
 def line_look(i: int) -> dict[str, Any]:
     """Return the look of the line of an identifier; the first have a colour each."""
-    return {"color": COLOURS[i], "lw": 1.7, "zorder": 3} if i < MOST_NAMED else {"color": PALE, "lw": 1.0, "zorder": 1}
+    return (
+        {"color": COLOURS[i], "lw": 1.7, "zorder": 3} if i < MOST_COLOURED else {"color": PALE, "lw": 1.0, "zorder": 1}
+    )
 
 
 def variant_handles(colours: Mapping[str, int]) -> list[Any]:
@@ -325,8 +327,8 @@ def draw_intervals(axis: Any, x: Array, y: Array, low: Array, high: Array, k: in
 
 def write_name(axis: Any, name: str, place: float, number: int) -> None:
     style = {"transform": axis.transAxes, "clip_on": False}
-    axis.plot([BESIDE, BESIDE + SAMPLE], [place, place], **style, **line_look(number))
-    axis.text(BESIDE + SAMPLE + GAP, place, name, transform=axis.transAxes, color=INK, va="center", fontsize=10)
+    axis.plot([BESIDE_AXES, BESIDE_AXES + SAMPLE], [place, place], **style, **line_look(number))
+    axis.text(BESIDE_AXES + SAMPLE + GAP, place, name, transform=axis.transAxes, color=INK, va="center", fontsize=10)
 
 
 def name_distance(axis: Any) -> float:

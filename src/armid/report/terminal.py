@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from rich.table import Table as RichTable
 
 # Letters between columns, and those of the frame.
-BESIDE, FRAME = 3, 1
+BETWEEN_COLUMNS, FRAME = 3, 1
 # A column of words is folded down to this width before another column is left out; one of numbers in words, such as
 # intervals, to the second.
 LEAST_WORDS, LEAST_NUMBERS = 12, 22
-FEW = 5
+FOLDED_WIDTH = 5
 # The first column tells the rows apart, and is not folded down to this width.
-NAME = 28
+NAME_WIDTH = 28
 
 
 def show(document: Document) -> None:
@@ -76,7 +76,7 @@ def print_table(table: Table, console: "Console") -> None:
 def fitted(columns: Sequence[Column], rows: Sequence[Sequence[Cell]], room: int) -> list[int]:
     """Return the widths of the columns that fit, the first at least; intervals are folded to make room for five."""
     whole, folded = (folded_to(columns, rows, room, least) for least in (LEAST_NUMBERS, LEAST_WORDS))
-    return folded if len(whole) < min(FEW, len(columns)) else whole
+    return folded if len(whole) < min(FOLDED_WIDTH, len(columns)) else whole
 
 
 def folded_to(columns: Sequence[Column], rows: Sequence[Sequence[Cell]], room: int, least_numbers: int) -> list[int]:
@@ -90,14 +90,14 @@ def folded_to(columns: Sequence[Column], rows: Sequence[Sequence[Cell]], room: i
         parts = max((len(word) for text in own for word in text.split()), default=0)
         folded = least_numbers if any(c.isdigit() for text in own for c in text) else LEAST_WORDS
         least.append(max(longest, width if column.digits else min(width, max(folded, parts))))
-    least[0] = min(whole[0], max(least[0], NAME))
-    n = max((k for k in range(1, len(columns) + 1) if FRAME + sum(least[:k]) + BESIDE * k <= room), default=1)
+    least[0] = min(whole[0], max(least[0], NAME_WIDTH))
+    n = max((k for k in range(1, len(columns) + 1) if FRAME + sum(least[:k]) + BETWEEN_COLUMNS * k <= room), default=1)
     widths = least[:n]
-    left = room - FRAME - sum(widths) - BESIDE * n
+    left = room - FRAME - sum(widths) - BETWEEN_COLUMNS * n
     for i in range(n):
         more = max(min(left, whole[i] - widths[i]), 0)
         widths[i], left = widths[i] + more, left - more
-    widths[0] = min(widths[0], max(room - FRAME - BESIDE, 1))
+    widths[0] = min(widths[0], max(room - FRAME - BETWEEN_COLUMNS, 1))
     return widths
 
 

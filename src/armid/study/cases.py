@@ -20,14 +20,14 @@ from armid.problem.problem import Replay, replays
 from armid.problem.space import Space, space_of
 from armid.problem.suite import DEFINITIONS, N_INSTANCES, VERSION, SuiteProblem, suite
 from armid.record import Campaign, Override, Record, read_campaign
-from armid.record.reader import NAME, campaign_path, record_constants
+from armid.record.reader import CAMPAIGN_FILE, campaign_path, record_constants
 from armid.record.record import made_record
 from armid.record.resample import FEWEST_SAMPLES, SLACK, is_constant, with_window
 from armid.record.schema import RecordSheet, unknown_name, validated
 from armid.study.inputs import input_values, inputs_of
 from armid.study.spec import (
     NOISES,
-    WHOLE,
+    WHOLE_WINDOW,
     CaseSpec,
     ManoeuvreSpec,
     RandomCasesSpec,
@@ -38,12 +38,12 @@ from armid.study.spec import (
 )
 from armid.units import DEG, SUFFIXES
 
-MOST_SAMPLES = 10**7
+MOST_SIMULATED = 10**7
 # What a problem of the suite brings, so that no key of a study may tell it.
 BROUGHT = ("noise_deg_s", "windows_s", "interval_s", "accuracy", "constants", "bounds", "fixed")
 # Steps at the truth are finer by this factor than those of the engine at its "fine" accuracy. The error falls with the
 # fourth power: of the arm it is then about 1e-11 rad/s.
-FINER = 8
+FINER_TRUTH = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,7 +167,7 @@ def _campaign_case(
             for record in campaign.records:
                 with_window(record, window, f"{where}, windows_s")
     files = tuple(r.file for r in campaign.records)
-    source = {"campaign": folder_name, "records": files, "digest": digest_of(path, (NAME, *files))}
+    source = {"campaign": folder_name, "records": files, "digest": digest_of(path, (CAMPAIGN_FILE, *files))}
     return Case(entry.name, model, space, dict(entry.truth), dict(entry.published), (), source, campaign.angle)
 
 
@@ -184,8 +184,10 @@ def campaign_folder(folder: Path, campaign: str, where: str) -> Path:
     if not Path(os.path.realpath(toml)).is_relative_to(os.path.realpath(folder)):
         raise ArmidError(f"{where}: campaign {quoted(campaign)} links out of the folder of the study, a folder inside "
                          "is expected")  # fmt: skip
-    if toml.name != NAME:
-        raise ArmidError(f"{where}: campaign {quoted(campaign)} is a file: a folder that holds {NAME} is expected")
+    if toml.name != CAMPAIGN_FILE:
+        raise ArmidError(
+            f"{where}: campaign {quoted(campaign)} is a file: a folder that holds {CAMPAIGN_FILE} is expected"
+        )
     return toml.parent
 
 
@@ -235,9 +237,9 @@ def _stroke(table: Mapping[str, Any], spec: StudySpec, plant: Plant, folder: Pat
     manoeuvre = validated(ManoeuvreSpec, table, where, [key.key for key in plant.keys])
     record = RecordSheet(file="", role=manoeuvre.role, constants=manoeuvre.constants, keys=manoeuvre.keys)
     constants = record_constants(plant, spec.constants, record, where)
-    if not FEWEST_SAMPLES - 1 <= manoeuvre.duration_s / spec.interval_s <= MOST_SAMPLES:
-        raise ArmidError(f"{where}: duration_s is {manoeuvre.duration_s:g}, {FEWEST_SAMPLES} to {MOST_SAMPLES} samples "
-                         f"of {spec.interval_s:g} s are expected")  # fmt: skip
+    if not FEWEST_SAMPLES - 1 <= manoeuvre.duration_s / spec.interval_s <= MOST_SIMULATED:
+        raise ArmidError(f"{where}: duration_s is {manoeuvre.duration_s:g}, {FEWEST_SAMPLES} to {MOST_SIMULATED} "
+                         f"samples of {spec.interval_s:g} s are expected")  # fmt: skip
     times = spec.interval_s * np.arange(round(manoeuvre.duration_s / spec.interval_s) + 1, dtype=np.float64)
     inputs = inputs_of(manoeuvre.inputs, plant, folder, times, where)
     # a plant without inputs keeps the settings, and with them the runs, that it had
@@ -272,7 +274,7 @@ def _check_truth(case: Case, where: str) -> None:
 
 def _check_windows(case: Case, spec: StudySpec, where: str) -> None:
     for window in spec.windows_s:
-        if window == WHOLE:
+        if window == WHOLE_WINDOW:
             continue
         begin, end = (float(t) for t in window)
         for stroke in case.strokes:
@@ -316,7 +318,7 @@ def clean_records(settings: Mapping[str, Any], model: Model) -> tuple[Record, ..
                   np.full(n_samples, each.default) for each in model.plant.inputs}  # fmt: skip
         manoeuvre = Manoeuvre(interval, n_samples, stroke["constants"], inputs)
         coarse = calibrate(model, manoeuvre, truth, FINE, spans=False).schedule
-        run = simulate(model, manoeuvre, truth, Schedule(FINER * coarse.substeps))
+        run = simulate(model, manoeuvre, truth, Schedule(FINER_TRUTH * coarse.substeps))
         if run.failed[0]:
             raise ArmidError(f"{name}: the simulation diverges at the truth, a motion is expected")
         if is_constant(run.output[0]):
@@ -327,7 +329,7 @@ def clean_records(settings: Mapping[str, Any], model: Model) -> tuple[Record, ..
 
 def in_window(record: Record, window: Sequence[float] | str) -> Record:
     """Return the record in a window [s]; the word for the whole record keeps the window of its file."""
-    return record if window == WHOLE else with_window(record, (float(window[0]), float(window[1])), record.file)
+    return record if window == WHOLE_WINDOW else with_window(record, (float(window[0]), float(window[1])), record.file)
 
 
 def noise_rms(settings: Mapping[str, Any], unit: str) -> float:
@@ -423,7 +425,7 @@ class RunCache:
 
     def _campaign(self, campaign: str, records: Sequence[str], digest: str) -> Campaign:
         path = campaign_folder(self.folder, campaign, "settings")
-        return unchanged_campaign(path, (NAME, *records), digest, campaign, self.registry)
+        return unchanged_campaign(path, (CAMPAIGN_FILE, *records), digest, campaign, self.registry)
 
     def _once(self, what: str, of: Mapping[str, Any], make: Callable[[], Any]) -> Any:
         key = what + json.dumps(of, sort_keys=True)

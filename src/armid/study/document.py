@@ -20,7 +20,7 @@ from armid.study.analyses.convergence import ANYTIME, CONVERGENCE
 from armid.study.analyses.cramer_rao import CRAMER_RAO
 from armid.study.analyses.errors import ERRORS
 from armid.study.analyses.fitness_quality import FITNESS_QUALITY
-from armid.study.analyses.overview import OVERVIEW, RUNS, campaigns, counted, loop_runs, main_table, verdicts
+from armid.study.analyses.overview import OVERVIEW, RUNS_ANALYSIS, campaigns, counted, loop_runs, main_table, verdicts
 from armid.study.analyses.ranks import BY_CLASS, RANKS, class_ranks
 from armid.study.analyses.running_time import BEST_FITNESS, RUNNING_TIME
 from armid.study.analyses.success import SUCCESS
@@ -33,10 +33,10 @@ from armid.units import DEG, angles_in
 # A new analysis is a file in this folder, and a name here.
 ANALYSES = (
     OVERVIEW, TABLE1, TABLE2, CRAMER_RAO, FITNESS_QUALITY, SUCCESS, RUNNING_TIME, BEST_FITNESS, CONVERGENCE, ERRORS,
-    RANKS, BY_CLASS, ANYTIME, RUNS,
+    RANKS, BY_CLASS, ANYTIME, RUNS_ANALYSIS,
 )  # fmt: skip
 # What stands in the report of a suite: no statistic of single parameters, which differ from problem to problem.
-OF_SUITES = (BY_CLASS, ANYTIME, BEST_FITNESS, SUCCESS, RUNNING_TIME, RUNS)
+OF_SUITES = (BY_CLASS, ANYTIME, BEST_FITNESS, SUCCESS, RUNNING_TIME, RUNS_ANALYSIS)
 # name -> function of the runs, see `armid.study.analyses.analysis.wide_runs`.
 OwnAnalyses = Mapping[str, Callable[[DataFrame], Any]]
 
@@ -104,7 +104,7 @@ def digits(kind: Any) -> str:
     return ".0f" if is_integer_dtype(kind) else ".6g"
 
 
-BESIDE = "each table is there as CSV and LaTeX too, each figure as SVG."
+ALSO_AS_FILES = "each table is there as CSV and LaTeX too, each figure as SVG."
 ALONE = "A seed decides the search alone; the noise is the records' own."
 PAIRED = "The same seed gives the same noise to all identifiers, so that they are compared in pairs."
 SYNTHETIC = (
@@ -175,8 +175,8 @@ def write_report(document: Document, files: NewFiles) -> None:
     write_files(document, files.path)
     commands = document.sections[-1].parts[0]
     again = commands.lines[1].text if isinstance(commands, Listing) else ""
-    files.path("report.md").write_text(markdown(document, f"Made from the stored results by `{again}`; {BESIDE}"),
-                                       encoding="utf-8")  # fmt: skip
+    made = f"Made from the stored results by `{again}`; {ALSO_AS_FILES}"
+    files.path("report.md").write_text(markdown(document, made), encoding="utf-8")
     svgs = {f.name: (files.place / f"{f.name}.svg").read_text(encoding="utf-8") for f in document.figures}
     files.path("report.html").write_text(html(document, svgs), encoding="utf-8")
 

@@ -20,9 +20,9 @@ from armid.study.analyses.analysis import outcomes
 from armid.study.results import StudyResults
 from armid.study.store import RunTrace
 
-VERSION, SUITE = "0.3.5", "armid"
+FORMAT_VERSION, SUITE = "0.3.5", "armid"
 # No fitness yet, as a number that every program reads.
-WORST = 1e300
+WORST_VALUE = 1e300
 # What iohinspector keeps of an instance: 16 bits.
 LARGEST_INSTANCE = 65_535
 
@@ -69,7 +69,7 @@ def _description(row: Any, function_id: int, names: tuple[str, ...]) -> dict[str
         attributes.append({"noise_deg_s": repr(float(row.noise_deg_s))})
     data = f"data_f{function_id}/IOHprofiler_f{function_id}_DIM{len(names)}.dat"
     return {
-        "version": VERSION,
+        "version": FORMAT_VERSION,
         "suite": SUITE,
         "function_id": function_id,
         "function_name": row.function,
@@ -93,7 +93,7 @@ def lines(trace: RunTrace, used: int) -> Iterator[str]:
         return " ".join([str(evaluation), repr(value), *(repr(float(v)) for v in x)]) + "\n"
 
     if trace.evaluations[0] > 1:
-        yield line(1, WORST, np.full(trace.X.shape[1], np.nan))
+        yield line(1, WORST_VALUE, np.full(trace.X.shape[1], np.nan))
     for evaluation, value, x in zip(trace.evaluations, trace.values, trace.X, strict=True):
         yield line(int(evaluation), float(value), x)
     if trace.evaluations[-1] < used:

@@ -18,7 +18,7 @@ from armid.record.table import read_table, time_column
 from armid.study.spec import any_whole, count
 
 ABOVE = "a number above 0"
-SEED = key(any_whole, "a whole number of at least 0", "Seed of what is drawn.")
+SEED_OF_INPUT = key(any_whole, "a whole number of at least 0", "Seed of what is drawn.")
 FROM_HZ = key(above_zero, ABOVE, "First frequency [Hz].")
 TO_HZ = key(above_zero, ABOVE, "Last frequency [Hz].")
 
@@ -59,7 +59,7 @@ class Multisine(InputSignal):
     from_hz: float = field(metadata=FROM_HZ)
     to_hz: float = field(metadata=TO_HZ)
     n: int = field(default=10, metadata=key(count, "a whole number above 0", "Number of sines."))
-    seed: int = field(default=1, metadata=SEED)
+    seed: int = field(default=1, metadata=SEED_OF_INPUT)
 
     def unit_values(self, times: Array) -> Array:
         phases = 2.0 * np.pi * np.random.default_rng(self.seed).random(self.n)
@@ -73,7 +73,7 @@ class Steps(InputSignal):
     """Levels drawn evenly from -1 to 1, each held for a time."""
 
     hold_s: float = field(metadata=key(above_zero, ABOVE, "Time for which a level is held [s]."))
-    seed: int = field(default=1, metadata=SEED)
+    seed: int = field(default=1, metadata=SEED_OF_INPUT)
 
     def unit_values(self, times: Array) -> Array:
         # rounding must not move a multiple of the hold to the level before

@@ -13,10 +13,10 @@ from numpy.random import default_rng
 
 from armid.errors import ArmidError, nearest, quoted
 from armid.loop import close_loop, report_of
-from armid.record.reader import NAME, SUFFIX
+from armid.record.reader import CAMPAIGN_FILE, CSV_SUFFIX
 from armid.record.schema import unknown_name, validated
 from armid.study.cases import RunCache, digest_of, unchanged_campaign
-from armid.study.spec import CLOSES_LOOP, LOOP_REPORTS, WHOLE, LoopSpec, StudyRegistry, lookup
+from armid.study.spec import CLOSES_LOOP, LOOP_REPORTS, WHOLE_WINDOW, LoopSpec, StudyRegistry, lookup
 from armid.study.store import Performed, Planned, planned
 
 
@@ -103,7 +103,7 @@ class LoopStudy:
                 settings["sensors"] = False
             elif unseen := [n for n in spec.without if n not in self.registry.effects]:
                 settings["without"] = unseen
-            yield planned(settings, case, CLOSES_LOOP, "", None, WHOLE, spec.seed, 0)
+            yield planned(settings, case, CLOSES_LOOP, "", None, WHOLE_WINDOW, spec.seed, 0)
 
     @staticmethod
     def perform(settings: Mapping[str, Any], cache: RunCache) -> Performed:
@@ -128,9 +128,9 @@ def _campaigns(spec: LoopSpec, folder: Path, where: str) -> dict[str, str]:
     made = f", `{spec.made_by}` makes them" if spec.made_by else ", a folder of campaigns is expected"
     if not place.is_dir():
         raise ArmidError(f"{where}: there are no campaigns in {quoted(spec.campaigns)}{made}")
-    names = sorted(path.name for path in place.iterdir() if (path / NAME).is_file())
+    names = sorted(path.name for path in place.iterdir() if (path / CAMPAIGN_FILE).is_file())
     if not names:
-        raise ArmidError(f"{where}: {quoted(spec.campaigns)} holds no folder with a {NAME}{made}")
+        raise ArmidError(f"{where}: {quoted(spec.campaigns)} holds no folder with a {CAMPAIGN_FILE}{made}")
     for pattern in spec.only:
         if not any(fnmatchcase(name, pattern) for name in names):
             raise ArmidError(f"{where}: key 'only' holds {quoted(pattern)}, which is not a campaign of "
@@ -141,5 +141,5 @@ def _campaigns(spec: LoopSpec, folder: Path, where: str) -> dict[str, str]:
 
 def _files(folder: Path) -> list[str]:
     """Return campaign.toml and all records of a campaign: runs on others are other runs."""
-    files = (f for f in folder.rglob("*") if f.suffix.lower() == SUFFIX and f.is_file())
-    return sorted([NAME, *(f.relative_to(folder).as_posix() for f in files)])
+    files = (f for f in folder.rglob("*") if f.suffix.lower() == CSV_SUFFIX and f.is_file())
+    return sorted([CAMPAIGN_FILE, *(f.relative_to(folder).as_posix() for f in files)])

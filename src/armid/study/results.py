@@ -31,7 +31,7 @@ from armid.study.store import (
 if TYPE_CHECKING:
     from armid.report.document import Document
 
-RUNS = """
+RUNS_QUERY = """
 SELECT p.run, p."case", p.identifier, p.fitness, p.noise_deg_s, p.window, p.seed, p.budget, i.used, i.n_failed, i.value,
 i.stopped, r.status, r.error, r.seconds, i.train_rmse, i.train_s, i.train_s1, i.train_s2, i.holdout_rmse, r.started_at,
 r.model, r.versions
@@ -45,7 +45,7 @@ SELECT p.run, p."case", l.verdict, r.seconds, l.cpu_seconds, l.report
 FROM plan p JOIN runs r USING (run) JOIN loops l USING (run) ORDER BY p.place
 """
 TRACES = "SELECT t.run, t.names, t.trace FROM plan p JOIN traces t USING (run)"
-NUMBERS = ("noise_deg_s", "value", "train_rmse", "train_s", "train_s1", "train_s2", "holdout_rmse", "seconds")
+NUMERIC_COLUMNS = ("noise_deg_s", "value", "train_rmse", "train_s", "train_s1", "train_s2", "holdout_rmse", "seconds")
 COUNTED = ("used", "n_failed")
 
 
@@ -204,8 +204,8 @@ def frame_of(connection: sqlite3.Connection, query: str) -> pd.DataFrame:
 
 
 def _runs(connection: sqlite3.Connection) -> pd.DataFrame:
-    runs = frame_of(connection, RUNS)
-    runs[list(NUMBERS)] = runs[list(NUMBERS)].astype(np.float64)
+    runs = frame_of(connection, RUNS_QUERY)
+    runs[list(NUMERIC_COLUMNS)] = runs[list(NUMERIC_COLUMNS)].astype(np.float64)
     runs[list(COUNTED)] = runs[list(COUNTED)].fillna(0).astype(np.int64)
     return runs.fillna({"stopped": ""})
 

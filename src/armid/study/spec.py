@@ -12,8 +12,8 @@ from armid.engine.calibrate import ALLOWED
 from armid.errors import ArmidError, MachineError
 from armid.model import Model
 from armid.record.schema import (
-    CONSTANTS,
-    EFFECTS,
+    CONSTANTS_KEY,
+    EFFECTS_KEY,
     PLANT,
     Kind,
     KindError,
@@ -39,7 +39,7 @@ from armid.registry import PLUGIN_PREFIX, Registry, load_plugin, load_registry
 IDENTIFIES, CLOSES_LOOP = KIND_NAMES = ("identify", "close_loop")
 REPORTS = ("", "table1", "table2", "benchmark", "fitness")
 LOOP_REPORTS = ("", "blind", "advice")
-WHOLE = "whole"
+WHOLE_WINDOW = "whole"
 # Kinds of what a model is made of.
 MODELS = ("plants", "effects")
 PLAIN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
@@ -97,10 +97,10 @@ def at_least_zero(value: object) -> float:
     return float(number(value)) + 0.0
 
 
-@kind(anyOf=[{"const": WHOLE}, list_of(number, 2, 2).schema])
+@kind(anyOf=[{"const": WHOLE_WINDOW}, list_of(number, 2, 2).schema])
 def window(value: object) -> tuple[float, ...] | str:
     """Return a window, [begin, end] or the word for all of a record."""
-    return WHOLE if value == WHOLE else tuple(list_of(number, 2, 2)(value))
+    return WHOLE_WINDOW if value == WHOLE_WINDOW else tuple(list_of(number, 2, 2)(value))
 
 
 @kind(type=["boolean", "number", "string"])
@@ -122,7 +122,7 @@ def options(value: object) -> dict[str, float | int | str | bool]:
 
 EFFECT_NAMES = list_of(name_in("effects"), 1)
 ROLE = one_of("train", "holdout")
-BOUNDS = key(table_of(list_of(number, 2, 2)), "[low, high] in SI", "Bounds of the search, by parameter.")
+BOUNDS_KEY = key(table_of(list_of(number, 2, 2)), "[low, high] in SI", "Bounds of the search, by parameter.")
 FIXED = key(table_of(number), "a finite number in SI", "Values of parameters that are not searched.")
 FITNESSES = key(one_or_more(text), "a name or a list of names", "What is minimised; `armid list fitness` shows them.")
 # SI unit of the simulated records -> end of the key that says their noise, such as `noise_deg_s`.
@@ -141,9 +141,9 @@ STUDY_NAME = key(
     "a plain name of letters, digits, '_', '-' and '.'",
     "The name of the study and of its folder of results.",
 )
-LINE = key(line_of_text, "a text on one line", "The name of the case on pages.")
+LINE_KEY = key(line_of_text, "a text on one line", "The name of the case on pages.")
 QUESTION = key(any_text, "a text", "The question that the study answers, shown at the head of its report.")
-SEEDS = key(seeds, "at most 1,000,000 seeds or a list", "Seeds of the searches, one run each; n means 1 to n.")
+SEEDS_KEY = key(seeds, "at most 1,000,000 seeds or a list", "Seeds of the searches, one run each; n means 1 to n.")
 PER_PARAMETER = key(
     rising_counts, "a whole number above 0, or a rising list of such",
     "Simulations of a run for each free parameter.",
@@ -153,7 +153,7 @@ BUDGETS = key(
     "Simulations of a run, of each where there are several; one candidate through all train records counts as one. "
     "With budget_per_parameter it may be left out, and no run has more.",
 )  # fmt: skip
-SEED = key(any_whole, "a whole number of at least 0", "Seed of what is drawn at random.")
+SEED_KEY = key(any_whole, "a whole number of at least 0", "Seed of what is drawn at random.")
 
 
 def kind_key(name: str) -> dict[str, Any]:
@@ -177,7 +177,7 @@ class ManoeuvreSpec:
     role: str = field(default="train", metadata=key(
         ROLE, "'train' or 'holdout'", "Whether parameters are searched on this record, or it judges the result.",
     ))  # fmt: skip
-    constants: Mapping[str, float] = field(default_factory=dict, metadata=CONSTANTS)
+    constants: Mapping[str, float] = field(default_factory=dict, metadata=CONSTANTS_KEY)
     inputs: Mapping[str, Any] = field(default_factory=dict, metadata=key(
         any_table, "a table of inputs",
         "Input -> { csv, column }, or { kind } with its parameters: chirp, multisine, steps or prbs.",
@@ -194,14 +194,14 @@ MANOEUVRES = key(
 class CaseSpec:
     """Declare a [[cases]] entry: a truth with manoeuvres, or a campaign."""
 
-    name: str = field(metadata=LINE)
+    name: str = field(metadata=LINE_KEY)
     truth: Mapping[str, float] = field(
         default_factory=dict, metadata=key(table_of(number), "a finite number in SI", "True value of each parameter.")
     )
     published: Mapping[str, float] = field(default_factory=dict, metadata=key(
         table_of(number), "a finite number in SI", "Values that others found, shown next to ours.",
     ))  # fmt: skip
-    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict, metadata=BOUNDS)
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict, metadata=BOUNDS_KEY)
     fixed: Mapping[str, float] = field(default_factory=dict, metadata=FIXED)
     manoeuvres: tuple[dict[str, Any], ...] = field(default=(), metadata=MANOEUVRES)
     campaign: str | None = field(default=None, metadata=key(
@@ -219,7 +219,7 @@ class RandomCasesSpec:
     n: int = field(
         metadata=key(whole_number(1, MOST_CASES), "a whole number above 0, up to 100,000", "Number of truths.")
     )
-    seed: int = field(metadata=SEED)
+    seed: int = field(metadata=SEED_KEY)
     manoeuvres: tuple[dict[str, Any], ...] = field(metadata=MANOEUVRES)
     margin: float = field(default=0.0, metadata=key(
         at_least_zero, "a share of the range from 0 to below 0.5",
@@ -260,7 +260,7 @@ class EntrySpec:
     noise_deg: tuple[float, ...] | None = field(default=None, metadata=levels("deg"))
     noise_mm_s: tuple[float, ...] | None = field(default=None, metadata=levels("mm/s"))
     noise_mm: tuple[float, ...] | None = field(default=None, metadata=levels("mm"))
-    seeds: tuple[int, ...] | None = field(default=None, metadata=SEEDS)
+    seeds: tuple[int, ...] | None = field(default=None, metadata=SEEDS_KEY)
     options: Mapping[str, Any] = field(default_factory=dict, metadata=key(
         options, "a number, a text, true or false", "Its options; `armid list identifiers --long` shows them.",
     ))  # fmt: skip
@@ -276,7 +276,7 @@ class StudySpec:
         list_of(table_for(EntrySpec), 1), "at least one table headed [[identifiers]]",
         "The optimisers that are compared.",
     ))  # fmt: skip
-    seeds: tuple[int, ...] = field(metadata=SEEDS)
+    seeds: tuple[int, ...] = field(metadata=SEEDS_KEY)
     budget: tuple[int, ...] = field(default=(), metadata=BUDGETS)
     question: str = field(default="", metadata=QUESTION)
     kind: str = field(default=IDENTIFIES, metadata=kind_key(IDENTIFIES))
@@ -286,9 +286,9 @@ class StudySpec:
     noise_deg: tuple[float, ...] = field(default=(0.0,), metadata=levels("deg"))
     noise_mm_s: tuple[float, ...] = field(default=(0.0,), metadata=levels("mm/s"))
     noise_mm: tuple[float, ...] = field(default=(0.0,), metadata=levels("mm"))
-    noise_seed: int = field(default=1, metadata=SEED)
-    windows_s: tuple[tuple[float, float] | str, ...] = field(default=(WHOLE,), metadata=key(
-        one_or_more(window), f"'{WHOLE}', or a list of [begin, end] in seconds and '{WHOLE}'",
+    noise_seed: int = field(default=1, metadata=SEED_KEY)
+    windows_s: tuple[tuple[float, float] | str, ...] = field(default=(WHOLE_WINDOW,), metadata=key(
+        one_or_more(window), f"'{WHOLE_WINDOW}', or a list of [begin, end] in seconds and '{WHOLE_WINDOW}'",
         "Parts of each record that fitness and errors see.",
     ))  # fmt: skip
     interval_s: float = field(default=1e-3, metadata=key(
@@ -298,9 +298,9 @@ class StudySpec:
         one_of("auto", *ALLOWED), f"one of 'auto', {', '.join(map(repr, ALLOWED))}",
         "Error of the engine; auto: fine where the noise would not hide the standard error.",
     ))  # fmt: skip
-    effects: tuple[str, ...] = field(default=(), metadata=EFFECTS)
-    constants: Mapping[str, float] = field(default_factory=dict, metadata=CONSTANTS)
-    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict, metadata=BOUNDS)
+    effects: tuple[str, ...] = field(default=(), metadata=EFFECTS_KEY)
+    constants: Mapping[str, float] = field(default_factory=dict, metadata=CONSTANTS_KEY)
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict, metadata=BOUNDS_KEY)
     fixed: Mapping[str, float] = field(default_factory=dict, metadata=FIXED)
     cases: tuple[dict[str, Any], ...] = field(default=(), metadata=key(
         list_of(table_for(CaseSpec), 1), "a list of at least one table", "What the optimisers are tried on.",
@@ -338,9 +338,9 @@ class LoopSpec:
     without: tuple[str, ...] = field(
         default=(), metadata=key(EFFECT_NAMES, "a list of names of effects", "Effects that are left out.")
     )
-    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict, metadata=BOUNDS)
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict, metadata=BOUNDS_KEY)
     fixed: Mapping[str, float] = field(default_factory=dict, metadata=FIXED)
-    seed: int = field(default=1, metadata=SEED)
+    seed: int = field(default=1, metadata=SEED_KEY)
     rivals: Mapping[str, tuple[str, ...]] = field(default_factory=dict, metadata=key(
         table_of(list_of(text, 1)), "lists of effects by names of campaigns",
         "Effects to look for in campaigns of a name, instead of the candidates.",

@@ -160,7 +160,7 @@ SELECT p.place, p.run, s.settings FROM plan p JOIN settings s USING (run)
 WHERE p.place > :after AND {CHOSEN} AND NOT EXISTS (SELECT 1 FROM runs r WHERE r.run = p.run) ORDER BY p.place LIMIT :n
 """
 # How many missing runs are fetched at a time.
-PAGE = 256
+PAGE_OF_ROWS = 256
 TALLY = f"""
 SELECT count(*), count(status), ifnull(sum(status = '{FAILED}'), 0) FROM plan p LEFT JOIN runs USING (run)
 WHERE {CHOSEN}
@@ -242,7 +242,7 @@ class Store:
     def missing(self) -> Iterator[MissingRun]:
         """Yield the runs that are not finished, in the order of the plan."""
         place = -1
-        while rows := self._selected(MISSING, after=place, n=PAGE):
+        while rows := self._selected(MISSING, after=place, n=PAGE_OF_ROWS):
             place = rows[-1][0]
             yield from (MissingRun(run, settings) for _, run, settings in rows)
 

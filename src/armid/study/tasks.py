@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 import numpy as np
 
 from armid.errors import ArmidError, MachineError, StudyError, caused_by, quoted
-from armid.estimation.identify import INTERRUPTED, Identification, identified, versions_of
+from armid.estimation.identify import WAS_INTERRUPTED, Identification, identified, versions_of
 from armid.identifiers import options_of
 from armid.model import Model
 from armid.problem.fitness import fitness_of_name
@@ -57,11 +57,11 @@ if TYPE_CHECKING:
 
 Task: TypeAlias = "Study | LoopStudy"
 Performer: TypeAlias = Callable[[MissingRun], Outcome]
-SUFFIX = ".toml"
+TOML_SUFFIX = ".toml"
 LONGEST_ERROR = 2000
 # Each run is a row of some kB in the store.
 MOST_RUNS = 1_000_000
-PACKAGES = ("armid", "numpy", "scipy", "numba", "pymoo", "nlopt")
+PACKAGES_OF_STUDY = ("armid", "numpy", "scipy", "numba", "pymoo", "nlopt")
 # What the system says when disk, memory or open files run out, or a disk fails.
 MACHINE = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.EROFS, errno.ENOMEM, errno.EMFILE, errno.ENFILE)
 
@@ -89,7 +89,7 @@ def read_study(path: str | Path, plugins: tuple[str, ...] = ()) -> "Task":
     """
     file = Path(path)
     if not file.is_file():
-        raise ArmidError(f"study {file} does not exist, a file that ends in {SUFFIX} is expected")
+        raise ArmidError(f"study {file} does not exist, a file that ends in {TOML_SUFFIX} is expected")
     table = load_toml(file)
     kind = table.get("kind", IDENTIFIES)
     # what is not text is refused with the other keys
@@ -149,7 +149,7 @@ def sentence(error: BaseException) -> str:
 
 @cache
 def versions() -> dict[str, str]:
-    return versions_of(PACKAGES)
+    return versions_of(PACKAGES_OF_STUDY)
 
 
 @dataclass(frozen=True, eq=False)
@@ -360,7 +360,7 @@ class Study:
         identification = identified(
             campaign, train, holdout, case.space, fitness, identifier, settings["budget"], settings["seed"]
         )
-        if identification.stopped == INTERRUPTED:
+        if identification.stopped == WAS_INTERRUPTED:
             # not what was asked for: the worker ends, and the run is given back
             raise KeyboardInterrupt
         near, far = identification.train, identification.holdout

@@ -8,14 +8,12 @@ import time
 from multiprocessing.connection import Connection
 from pathlib import Path
 
-from armid.errors import ArmidError, MachineError
+from armid.errors import INTERRUPTED, ArmidError, MachineError
 from armid.study.cases import RunCache
 from armid.study.spec import study_registry
 from armid.study.tasks import perform, task_type
 
 READY, REFUSED, FINISHED = "ready", "refused", "finished"
-# The code with which a worker ends that a plug-in has interrupted.
-INTERRUPTED = 130
 # How often a worker looks whether the process that it works for still lives [s].
 LOOKS_EVERY_S = 1.0
 

@@ -17,9 +17,9 @@ from armid.inference.whitening import WhiteRecords
 from armid.model import Array
 
 # Fewest record files for a drift to be considered: with fewer a drift is a fault of one record.
-FEWEST = 4
+FEWEST_RECORDS = 4
 # Its largest plausible size, as a share of the range or of the constant; prior deviations as shares of that.
-LARGEST, SCALES = 0.5, np.array([0.01, 0.03, 0.1, 0.3, 1.0])
+LARGEST_DRIFT, SCALES_OF_DRIFT = 0.5, np.array([0.01, 0.03, 0.1, 0.3, 1.0])
 # Smallest size about which its effect is taken: of smaller ones rounding would speak.
 LEAST_SIZE = 0.01
 
@@ -37,7 +37,7 @@ class OfParameter:
         firsts, changes = [i for i, replay in enumerate(records.replays) if replay.index == 0], []
         at, names = records.shares(free_values(records, fit.values)), records.space.free_names
         for place, index in enumerate(firsts):
-            share = size * LARGEST * (place / (len(firsts) - 1.0) - 0.5) * np.array([0.0, 0.5, 1.0])
+            share = size * LARGEST_DRIFT * (place / (len(firsts) - 1.0) - 0.5) * np.array([0.0, 0.5, 1.0])
             Z, shares = np.tile(at, (3, 1)), {name: np.full(3, off) for name, off in fit.constants.items()}
             if self.product is not None:
                 name = self.product.names[0]
@@ -69,7 +69,7 @@ class Undone:
 
 def hypotheses(fit: Fit, library: Library) -> list[Hypothesis]:
     """Return the drifts of parameters and constants, none where there are few records."""
-    if len(fit.records.data.records) < FEWEST:
+    if len(fit.records.data.records) < FEWEST_RECORDS:
         return []
     own = [OfParameter(name) for name in fit.values if library.owner(name) is None]
     own += [OfParameter(p.public, p) for p in fit.products(library.tolerances)]
@@ -87,9 +87,11 @@ def propose(fit: Fit, known: list[Hypothesis]) -> list[Proposal]:
         if name_of(hypothesis) in held or (what.product is None and what.name not in names):
             continue
         slope = what.product.slope if what.product is not None else fit.jacobian[:, names.index(what.name)]
-        column = LARGEST * slope * order
+        column = LARGEST_DRIFT * slope * order
         if column.any():
-            proposals.append(Proposal(hypothesis, column[np.newaxis], SCALES, np.zeros(1), partial(refit, hypothesis)))
+            proposals.append(
+                Proposal(hypothesis, column[np.newaxis], SCALES_OF_DRIFT, np.zeros(1), partial(refit, hypothesis))
+            )
     return proposals
 
 

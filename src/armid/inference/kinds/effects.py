@@ -8,7 +8,7 @@ import numpy as np
 from armid.estimation.least_squares import descend
 from armid.inference.candidates import EffectKey
 from armid.inference.decisions import calibration
-from armid.inference.evidence import SCALES, Expansion, Forecast
+from armid.inference.evidence import SCALES_OF_STRENGTH, Expansion, Forecast
 from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.library import Library, activation_grid
 from armid.inference.model import (
@@ -27,11 +27,11 @@ from armid.model import Array
 
 # Shares of the range over which a strength is tried: a slope, and two secants where the response is not linear.
 SLOPE = 1e-3
-SHARES = (SLOPE, 0.05, 0.4)
+SHARES_TRIED = (SLOPE, 0.05, 0.4)
 # Variants of a forecast from which a fit may start.
-N_STARTS = 4
+N_STARTS_OF_EFFECT = 4
 # First steps of a fit, after which it shows how far it may lead.
-N_STEPS = 2
+N_FIRST_STEPS = 2
 # Share of a squared response along one parameter from which an effect may be that parameter, and the share that
 # rounding leaves of what is the same. Strength of other effects where it is looked at, as a share of their size.
 PARALLEL, SAME_RESPONSE, COMPANY = 0.9, 1e-7, 0.03
@@ -90,7 +90,7 @@ def proposals(
 def proposal(fit: Fit, hypothesis: Hypothesis, key: EffectKey, library: Library) -> Proposal | None:
     records = beside(fit, (*fit.active, key), library)
     activations, _ = activation_grid(records, key, library.declared_ranges(records.model, key))
-    grid = [replace(a, share=share) for a in activations if a.share == activations[0].share for share in SHARES]
+    grid = [replace(a, share=share) for a in activations if a.share == activations[0].share for share in SHARES_TRIED]
     moved = responses(fit, records, grid)
     good = np.flatnonzero(np.isfinite(moved).all(axis=1) & (np.abs(moved).max(axis=1, initial=0.0) > 0.0))
     if not len(good):
@@ -98,7 +98,7 @@ def proposal(fit: Fit, hypothesis: Hypothesis, key: EffectKey, library: Library)
     chosen = [grid[i] for i in good]
     variants = np.full(len(good), -np.log(len(grid)))
     return Proposal(
-        hypothesis, moved[good], SCALES, variants, partial(refit, key, library), one_sided=True, grid=chosen
+        hypothesis, moved[good], SCALES_OF_STRENGTH, variants, partial(refit, key, library), one_sided=True, grid=chosen
     )
 
 
@@ -231,7 +231,7 @@ def first_steps(fit: Fit, about: Expansion, ahead: Forecast, library: Library) -
     best = starts[int(np.argmin(chi2))]
     if not np.isfinite(chi2.min()):
         return np.inf, best
-    z = descend(projection, [best], ROUGHLY, most=N_STEPS)
+    z = descend(projection, [best], ROUGHLY, most=N_FIRST_STEPS)
     return float(projection.chi2(z)[0]), z
 
 
@@ -240,7 +240,7 @@ def starts_of(
 ) -> list[Array]:  # fmt: skip
     """Return extended candidates at expected and tried strengths, with the linear answer of the parameters."""
     starts, grid = [], ahead.proposal.grid
-    for variant, strength in ahead.best(N_STARTS):
+    for variant, strength in ahead.best(N_STARTS_OF_EFFECT):
         for share in dict.fromkeys((float(np.clip(strength, 0.01, library.reach)), grid[variant].share)):
             z = np.clip(fit.z - share * ahead.answer[: fit.n_free, variant], 0.01, 0.99)
             values = dict(zip(fit.values, fit.records.values(z), strict=True)) | grid[variant].at(share)

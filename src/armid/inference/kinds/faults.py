@@ -28,9 +28,9 @@ PLAUSIBLE = {"late": 0.05, "clock": 0.02, "offset": 0.05, "drift": 0.1, "gain": 
 # Faults of a sensor, and of the times; all but those of a sensor are of the whole file, or of one sensor alone.
 OF_SENSOR, OF_TIMES = ("offset", "drift", "gain"), ("late", "clock")
 # Samples on either side from which one between them is made.
-REACH = 32
+SIDE_SAMPLES = 32
 # Share of the largest plausible size over which differences are taken.
-STEP = 1e-3
+FAULT_STEP = 1e-3
 
 
 @dataclass(frozen=True)
@@ -121,18 +121,18 @@ def resampled(signal: Array, places: Array) -> Array:
 
     A spline would smooth it, and what is left would no longer look like the noise of the sensor. places: in samples.
     """
-    padded = np.pad(signal, REACH, mode="reflect", reflect_type="odd")
+    padded = np.pad(signal, SIDE_SAMPLES, mode="reflect", reflect_type="odd")
     near, weights = sinc_weights(len(signal), places)
-    return np.asarray(np.sum(padded[near + REACH] * weights, axis=1))
+    return np.asarray(np.sum(padded[near + SIDE_SAMPLES] * weights, axis=1))
 
 
 def sinc_weights(n: int, places: Array) -> tuple[NDArray[np.int64], Array]:
     """Return for each place which of n samples are near, and what each weighs, (n_places, 2 REACH) both."""
     inside = np.clip(places, 0.0, n - 1.0)
-    first = np.minimum(np.floor(inside), n - 2.0).astype(np.int64) - REACH + 1
-    near = first[:, np.newaxis] + np.arange(2 * REACH)
+    first = np.minimum(np.floor(inside), n - 2.0).astype(np.int64) - SIDE_SAMPLES + 1
+    near = first[:, np.newaxis] + np.arange(2 * SIDE_SAMPLES)
     away = inside[:, np.newaxis] - near
-    weights = np.sinc(away) * np.cos(0.5 * np.pi * away / REACH) ** 2
+    weights = np.sinc(away) * np.cos(0.5 * np.pi * away / SIDE_SAMPLES) ** 2
     return near, weights / np.sum(weights, axis=1, keepdims=True)
 
 
@@ -230,7 +230,7 @@ def column_of(base: WhiteRecords, index: int, z: Array, fault: Fault, value: flo
     if fault.kind in OF_TIMES:
         moved = with_measured(base, index, delayed(base, index, z, fault))
         return residual_of(moved, index, z) - residual_of(base, index, z)
-    step = STEP * fault.largest(base.data.each[index])
+    step = FAULT_STEP * fault.largest(base.data.each[index])
     sides = [residual_of(with_record(base, index, fault, value + s), index, z) for s in (step, -step)]
     return np.asarray(sides[1] - sides[0]) / (2.0 * step)
 
@@ -250,7 +250,7 @@ def moved_by(base: WhiteRecords, index: int, z: Array, fault: Fault, value: floa
 
 
 # Prior deviations of a size, as shares of the largest plausible one.
-SCALES = np.array([0.01, 0.03, 0.1, 0.3, 1.0])
+SCALES_OF_FAULT = np.array([0.01, 0.03, 0.1, 0.3, 1.0])
 
 
 @dataclass(frozen=True)
@@ -309,7 +309,7 @@ def proposal(fit: Fit, hypothesis: Hypothesis) -> Proposal | None:
         column, scales = before - after, np.array([1.0])
     else:
         column = what.largest * column_of(fit.records, what.index, fit.z, what.fault, 0.0)
-        scales = SCALES
+        scales = SCALES_OF_FAULT
     if not np.isfinite(column).all() or not column.any():
         return None
     return Proposal(hypothesis, column[np.newaxis], scales, np.zeros(1), partial(refit, hypothesis))

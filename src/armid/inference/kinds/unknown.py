@@ -21,10 +21,10 @@ from armid.inference.whitening import Cover, WhiteRecords
 from armid.model import Array
 
 # Prior deviations: rms by which the signal moves all records, in units of the noise.
-SCALES = np.array([0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
+SCALES_OF_SIGNAL = np.array([0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0])
 # Lengths over which the signal forgets, as shares of the median duration of a piece; of a curve, of its range.
 LENGTHS, LENGTH_OF_CURVE = (0.07, 0.2), 0.25
-TIME = "time"
+OVER_TIME = "time"
 # Columns of a curve, knots under it, and the most columns of one piece in time.
 N_CURVE, N_KNOTS, MOST_IN_TIME = 6, 10, 20
 
@@ -56,11 +56,11 @@ def signals_without_form(fit: Fit, library: Library) -> Signals:
     duration = float(np.median([s.knots[-1] - s.knots[0] for s in segments]))
     for port in segments[0].gains:
         for share in LENGTHS:
-            columns[port, f"{TIME} ({share:g} of a record)"] = white(block_diag(*(
+            columns[port, f"{OVER_TIME} ({share:g} of a record)"] = white(block_diag(*(
                 s.gains[port] @ process(s.knots, share * duration, MOST_IN_TIME) for s in segments)))  # fmt: skip
         for variable in segments[0].variables:
             for factor in segments[0].factors:
-                if variable not in (factor, TIME):
+                if variable not in (factor, OVER_TIME):
                     name = variable if factor == "1" else f"{variable} x {factor}"
                     columns[port, name] = white(over_variable(segments, port, variable, factor))
     sizes = {key: float(np.sqrt(np.sum(column**2) / n)) for key, column in columns.items()}
@@ -108,7 +108,7 @@ def propose(fit: Fit, library: Library) -> list[Proposal]:
     known = signals_without_form(fit, library).columns
     return [
         Proposal(Hypothesis("unknown", port, variable, calibration().log_odds("unknown", len(known)), (port, variable)),
-                 column.T, SCALES, np.zeros(1), partial(refit, library, (port, variable)), joint=True)
+                 column.T, SCALES_OF_SIGNAL, np.zeros(1), partial(refit, library, (port, variable)), joint=True)
         for (port, variable), column in known.items()
     ]  # fmt: skip
 
@@ -131,7 +131,7 @@ def refit(
         again = tried
     # The likeliest variable is a guess, and by a wrong one a model with wrong parameters can leave noise alone: its
     # variance once more, spread evenly over the curves of all variables at all ports.
-    curves = [column for (_, variable), column in signals.items() if not variable.startswith(TIME)]
+    curves = [column for (_, variable), column in signals.items() if not variable.startswith(OVER_TIME)]
     if not curves:
         return again
     return with_cover(again, cover.with_elsewhere(scale / np.sqrt(len(curves)) * np.hstack(curves)))

@@ -68,7 +68,7 @@ tachometer_ripple = Effect(
 # good to (w T)^5/720 at the frequency w; a step it answers before T. Where the hold is a part h of the lateness, T and
 # the equations lie between the two, right to s^2. Below 2 ms the filter stays that of 2 ms while the factor T goes on
 # falling: the same delay, no stiff equation, a derivative at the null. A loop closed from the start is not late.
-SHORT = 1e-4
+SHORT_TIME_S = 1e-4
 
 
 def lateness(delay, period):
@@ -78,7 +78,7 @@ def lateness(delay, period):
 
 def held_part(delay, period):
     """Part h of the lateness that is the hold's."""
-    return 0.5 * period / np.maximum(lateness(delay, period), SHORT)
+    return 0.5 * period / np.maximum(lateness(delay, period), SHORT_TIME_S)
 
 
 def filter_time(delay, period):
@@ -126,8 +126,8 @@ def waited(theta_C, theta_D, delta_E, delay):
 def still_to_wait(closed, delay, period, waiting, clock):
     """Return the time until the late switch [s]: the rest of the dead time, and then until the next sample."""
     due = clock - waiting + delay
-    sample = -np.floor(-due / np.maximum(period, SHORT)) * period
-    return np.where(closed > 0.5, np.where(period > SHORT, sample, due) - clock, lateness(delay, period))
+    sample = -np.floor(-due / np.maximum(period, SHORT_TIME_S)) * period
+    return np.where(closed > 0.5, np.where(period > SHORT_TIME_S, sample, due) - clock, lateness(delay, period))
 
 
 def present_angle(theta):

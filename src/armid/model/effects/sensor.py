@@ -9,7 +9,7 @@ from armid.model.parameter import Parameter
 from armid.model.plant import Output, Plant
 
 # Unit of an output -> unit of its bias; other units stay as they are.
-SCALES = {"rad/s": "speed", "m/s": "speed", "rad": "speed*s", "m": "speed*s", "N": "effort", "N m": "effort"}
+SCALES_OF_UNIT = {"rad/s": "speed", "m/s": "speed", "rad": "speed*s", "m": "speed*s", "N": "effort", "N m": "effort"}
 
 
 def sensor_effects(plant: Plant) -> dict[str, Effect]:
@@ -23,7 +23,7 @@ def sensor_effects(plant: Plant) -> dict[str, Effect]:
 
 def effects_at(output: Output, plant: Plant) -> list[Effect]:
     of, source = f"of {output.name}", "Doebelin, Measurement Systems, chapter 3"
-    bias = Parameter("bias", SCALES.get(output.unit, output.unit), -0.1, 0.1, null=0.0)
+    bias = Parameter("bias", SCALES_OF_UNIT.get(output.unit, output.unit), -0.1, 0.1, null=0.0)
     effects = [Effect(f"{output.name}_bias", (bias,), {output.port: bias_error}, note=f"constant error {of}",
                       source=source)]  # fmt: skip
     asked = signature(plant.quantities[output.signal]).parameters if output.signal in plant.quantities else ()

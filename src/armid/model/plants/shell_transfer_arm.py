@@ -192,7 +192,7 @@ def current_sign(current):
     return current
 
 
-QUANTITIES = (
+ARM_QUANTITIES = (
     arm_inertia, total_inertia, gravity_moment, gravity_level, gravity_upright, gravity_torque, squeeze, piston_moment,
     balance_torque, direction, damping, demand, voltage, field_flux, back_emf, motor_torque, drive_ratio, drive_effort,
     load_effort, recorded_speed,
@@ -218,7 +218,7 @@ GAS_AND_DRIVE = {
     "R": (0.40, "ohm"), "L_a": (2.0e-3, "H"), "K": (4.5e-5, "Wb/A"), "C_e": (20.0, "1"), "C_T": (20.0, "1"),
     "K_p": (280.0, "V/rad"), "K_d": (70.0, "V s/rad"), "u_th": (0.5, "V"), "delta_E": (25.0 * DEGREE, "rad"),
 }  # fmt: skip
-ESTIMATE, TOLERANCE = "estimate (REF), not published", 0.02
+ESTIMATE, ARM_TOLERANCE = "estimate (REF), not published", 0.02
 # What a constant of such a machine can be at all, so that a forgotten factor of its unit is noticed.
 POSSIBLE = {
     "kg m2": (0.0, 1e4), "kg": (0.0, 1e4), "m": (0.0, 10.0), "m2": (0.0, 0.1), "m3": (0.0, 0.1), "m/s2": (0.0, 30.0),
@@ -233,7 +233,7 @@ def possible(name, unit):
 
 def estimated(declared):
     """Return constants that are estimates, from name -> (value, unit)."""
-    return (Constant(name, value, unit, ESTIMATE, TOLERANCE, *possible(name, unit))
+    return (Constant(name, value, unit, ESTIMATE, ARM_TOLERANCE, *possible(name, unit))
             for name, (value, unit) in declared.items())  # fmt: skip
 
 
@@ -255,7 +255,7 @@ shell_transfer_arm = Plant(
         State("compression", "1", compression_rate, start_compression),
         State("pressure", "Pa", pressure_rate, start_pressure),
     ),
-    quantities={f.__name__: f for f in QUANTITIES},
+    quantities={f.__name__: f for f in ARM_QUANTITIES},
     constants=(
         *estimated(MECHANICAL),
         Constant("g", 9.81, "m/s2", "", 0.0, *POSSIBLE["m/s2"]),

@@ -23,7 +23,7 @@ T = TypeVar("T")
 # 51 targets, as COCO takes, five a decade: largest relative errors of the parameters from 100 % to 1e-8 %, and shares
 # of the way from a first candidate to the best fitness that anyone found.
 TARGETS = 10.0 ** (-np.arange(51) / 5.0)
-N_GRID = 61
+N_OF_CURVE = 61
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ def histories(
     """
     # from 1 to the most simulations of a run, evenly spread in the logarithm
     most = max(int(runs["used"].max()) if len(runs) else 1, 1)
-    grid = np.unique(np.round(np.geomspace(1, most, N_GRID)).astype(np.int64))
+    grid = np.unique(np.round(np.geomspace(1, most, N_OF_CURVE)).astype(np.int64))
     place = {run: i for i, run in enumerate(runs["run"])}
     firsts = np.full(len(place), np.nan)
     for trace in results.iter_traces():
@@ -115,16 +115,16 @@ def trace_errors(trace: RunTrace, truth: Mapping[str, float]) -> Array:
     return errors
 
 
-NOISE_FREE, SPEED = "noise-free", "rad/s"
+WITHOUT_NOISE, SPEED_UNIT = "noise-free", "rad/s"
 PAPER = "the paper's pso"
 # Variants that a table of every row and parameter is printed for, with the paper's own method.
 MOST_OTHERS = 3
 # What a setting is made of.
-APART = ("noise", "window", "budget")
+SETTINGS_APART = ("noise", "window", "budget")
 # The columns by which most tables tell their rows apart.
 SETTING, VARIANT = Column("setting", "noise"), Column("variant", "identifier")
 # The same column in a report of a suite, where budgets take the place of noise levels.
-BUDGET = Column("setting", "budget")
+BUDGET_COLUMN = Column("setting", "budget")
 PARAMETER, N_RUNS = Column("parameter", "parameter"), Column("n", "runs", ".0f")
 
 
@@ -151,7 +151,7 @@ class Evidence:
         self.study: dict[str, Any] = results.study
         self.parameters: DataFrame = results.parameters
         # of the records, SI; older studies do not tell it
-        self.unit = str(self.study.get("unit", SPEED))
+        self.unit = str(self.study.get("unit", SPEED_UNIT))
         self.runs = ordered(outcomes(results.runs, self.parameters, self.unit), self.study)
         budgets = Series("", index=self.runs.index)
         if self.study.get("budget_per_parameter"):
@@ -163,14 +163,14 @@ class Evidence:
             self.runs["setting"] += ", " + budgets + " simulations"
         noise = self.runs["noise_deg_s"].map(partial(noise_text, unit=self.unit))
         runs = self.runs.assign(noise=noise, budget=budgets)
-        self._apart = runs.drop_duplicates("setting").set_index("setting")[list(APART)]
+        self._apart = runs.drop_duplicates("setting").set_index("setting")[list(SETTINGS_APART)]
         keys = ["run", "case", "variant", "setting", "seed", "fitness", "noise_deg_s"]
         done = self.runs.loc[self.runs["status"] == "done", keys]
         self.estimates = done.merge(self.parameters, on="run", how="inner", sort=False)
 
     def apart(self, part: P) -> P:
         """Return a table in which noise, window and budget have columns of their own, as far as they differ."""
-        keys = [key for key in APART if self._apart[key].nunique() > 1]
+        keys = [key for key in SETTINGS_APART if self._apart[key].nunique() > 1]
         if not isinstance(part, Table) or not isinstance(part.frame, DataFrame) or not keys:
             return part
         place = next((i for i, column in enumerate(part.columns) if column.key == "setting"), None)
@@ -298,7 +298,7 @@ def wide_runs(evidence: Evidence) -> DataFrame:
     columns = {"value": "", "truth": "_truth", "relative_error": "_error", "deviation": "_deviation",
                "at_bound": "_at_bound"}  # fmt: skip
     wide = evidence.runs.drop(columns=["started_at", "model", "versions"], errors="ignore")
-    wide = wide.rename(columns={"noise_deg_s": f"noise_{NOISES.get(evidence.unit, NOISES[SPEED])}"})
+    wide = wide.rename(columns={"noise_deg_s": f"noise_{NOISES.get(evidence.unit, NOISES[SPEED_UNIT])}"})
     wide.insert(0, "study", str(evidence.study["name"]))
     values: dict[str, Series[Any]] = {}
     for name, rows in evidence.parameters.groupby("parameter", sort=False):
@@ -308,7 +308,7 @@ def wide_runs(evidence: Evidence) -> DataFrame:
     return wide.join(DataFrame(values, index=wide.index))
 
 
-def outcomes(runs: DataFrame, parameters: DataFrame, unit: str = SPEED) -> DataFrame:
+def outcomes(runs: DataFrame, parameters: DataFrame, unit: str = SPEED_UNIT) -> DataFrame:
     """Return the runs with `variant`, `setting` (noise, and the window of several) and `largest_error`.
 
     variant: label of the identifier, and the fitness where a label ran on several. largest_error: relative, over the
@@ -333,11 +333,11 @@ def budget_texts(runs: DataFrame, study: dict[str, Any]) -> list[str]:
             for c, b in zip(runs["case"], runs["budget"], strict=True)]  # fmt: skip
 
 
-def noise_text(level: float, unit: str = SPEED) -> str:
+def noise_text(level: float, unit: str = SPEED_UNIT) -> str:
     """Return a level of noise in words; unit: of the records, SI."""
     if np.isnan(level):
         return "as recorded"
-    return NOISE_FREE if level == 0.0 else f"{level:g} {NOISES[unit].replace('_s', '/s')}"
+    return WITHOUT_NOISE if level == 0.0 else f"{level:g} {NOISES[unit].replace('_s', '/s')}"
 
 
 def fitness_scale(name: str, unit: str) -> tuple[str, float]:

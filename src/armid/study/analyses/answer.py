@@ -12,7 +12,7 @@ from armid.study.analyses.ranks import HALF, alike_text, arrived_text, compared,
 # The answer names so many settings; the table holds all.
 MOST_SETTINGS = 3
 # Of the paper's simulations: what its table is to be beaten with.
-QUARTER = 0.25
+QUARTER_OF_RUNS = 0.25
 # A parameter whose mean error is more times its scatter than this is off, whatever the search does.
 OFF = 3.0
 # Identifiers of plug-ins that the answer places in one setting, the best first; the table holds all.
@@ -49,7 +49,7 @@ def beside_paper(evidence: Evidence, frame: DataFrame) -> tuple[str, ...]:
     if printed.empty or swarms.empty:
         return ()
     paper, swarm = float(printed.iloc[0]), swarms.iloc[0]
-    cheap = ours[ours["used"] <= QUARTER * swarm["used"]]
+    cheap = ours[ours["used"] <= QUARTER_OF_RUNS * swarm["used"]]
     best = cheap.loc[cheap["largest_median"].idxmin()] if len(cheap) else None
     own = evidence.of(setting)
     errors = own.loc[own["variant"] == swarm.name, "largest_error"].to_numpy(float)

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.report.document import Column, Figure, Part, Table, slug
-from armid.study.analyses.analysis import BUDGET, VARIANT, Analysis, Evidence, fitness_scale
-from armid.study.analyses.running_time import PAIRS_HIT, SHARES, line_panels, share_hit
+from armid.study.analyses.analysis import BUDGET_COLUMN, VARIANT, Analysis, Evidence, fitness_scale
+from armid.study.analyses.running_time import PAIRS_HIT, SHARE_AXES, line_panels, share_hit
 
 Array = NDArray[np.floating[Any]]
 ERROR_LABEL = "largest relative error [%]"
@@ -115,7 +115,7 @@ def areas(evidence: Evidence) -> Table:
     frame = groups.describe()[["count", "mean", "25%", "50%", "75%"]].reset_index()
     place = {setting: i for i, setting in enumerate(evidence.settings)}
     frame = frame.assign(_at=frame["setting"].map(place)).sort_values(["_at", "mean"], ascending=[True, False])
-    columns = (BUDGET, VARIANT, Column("count", "runs", ".0f"), Column("mean", "area", ".3f"),
+    columns = (BUDGET_COLUMN, VARIANT, Column("count", "runs", ".0f"), Column("mean", "area", ".3f"),
                Column("25%", "lower quartile", ".3f"), Column("50%", "median", ".3f"),
                Column("75%", "upper quartile", ".3f"))  # fmt: skip
     return Table("anytime", "Area over the convergence curve", AREA_CAPTION, frame.drop(columns="_at"), columns,
@@ -131,4 +131,4 @@ def attained(evidence: Evidence) -> Any:
         last = max(float(budget[rows].max()) for rows in variants.values())
         grid = np.geomspace(1.0 / evidence.n_free.max(), last, 121)
         curves.append((setting, grid, {v: share_hit(per_parameter[rows], grid) for v, rows in variants.items()}))
-    return line_panels(curves, evidence.colours, xlabel="simulations / free parameters", ylabel=PAIRS_HIT, **SHARES)
+    return line_panels(curves, evidence.colours, xlabel="simulations / free parameters", ylabel=PAIRS_HIT, **SHARE_AXES)

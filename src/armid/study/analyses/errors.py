@@ -8,7 +8,7 @@ import numpy as np
 from pandas import DataFrame, concat
 
 from armid.report.document import Figure, Part, slug
-from armid.report.style import COLOURS, MARKERS, MOST_NAMED, PALE, PRINTED, no_formulas, pyplot
+from armid.report.style import COLOURS, MARKERS, MOST_COLOURED, PALE, PRINTED_WIDTH, no_formulas, pyplot
 from armid.study.analyses.analysis import Analysis, Evidence, every_nth
 
 # Range of the colours of the map [%]; cells carry numbers up to so many cases.
@@ -16,7 +16,7 @@ LOWEST, HIGHEST = 1e-6, 1e2
 MOST_NUMBERS = 12
 # The parameters that compensate each other on the arm; others where a study has others.
 VALLEY = ("p0", "eta3", "n", "k")
-MOST_PARAMETERS, MOST_POINTS = 4, 600
+MOST_PARAMETERS, MOST_ERRORS_DRAWN = 4, 600
 OTHERS = "all others"
 MAP_CAPTION = (
     "Largest relative error of a run [%], median over the seeds, by identifier and case, one map a noise level, "
@@ -60,7 +60,7 @@ def error_map_figure(maps: Mapping[str, DataFrame]) -> Any:
     plt = pyplot()
     n_rows = sum(len(m) for m in maps.values())
     n_columns = max(m.shape[1] for m in maps.values())
-    numbers = n_columns <= (MOST_NUMBERS if PRINTED.get() != "single" else 0)
+    numbers = n_columns <= (MOST_NUMBERS if PRINTED_WIDTH.get() != "single" else 0)
     low, high = colour_range(np.concatenate([100.0 * m.to_numpy(float).ravel() for m in maps.values()]))
     size = (3.4 + (0.95 if numbers else 0.36) * n_columns, 1.3 * len(maps) + 0.36 * n_rows + 0.4)
     with no_formulas():
@@ -73,7 +73,7 @@ def error_map_figure(maps: Mapping[str, DataFrame]) -> Any:
                         yticklabels=True)  # fmt: skip
             axis.set(title=setting, xlabel="", ylabel="")
             axis.tick_params(length=0)
-            if PRINTED.get() == "single":
+            if PRINTED_WIDTH.get() == "single":
                 axis.tick_params(axis="x", labelrotation=90)
     beside = {"ax": list(axes.ravel()), "pad": 0.02, "fraction": 0.05, "shrink": 1.0 / len(maps), "aspect": 25}
     bar = figure.colorbar(axes[0, 0].collections[0], extend="both", **beside)
@@ -113,7 +113,7 @@ def valley_figure(ends: DataFrame, colours: Mapping[str, int]) -> Any:
 
     pyplot()
     names = [c for c in ends.columns if c not in ("variant", "setting")]
-    chosen = [v for v in sorted(colours, key=lambda v: colours[v]) if colours[v] < MOST_NAMED]
+    chosen = [v for v in sorted(colours, key=lambda v: colours[v]) if colours[v] < MOST_COLOURED]
     shown = thinned(ends.assign(shown=ends["variant"].where(ends["variant"].isin(chosen), OTHERS)))
     hues = [v for v in (OTHERS, *chosen) if v in set(shown["shown"])]
     palette = {v: PALE if v == OTHERS else COLOURS[colours[v]] for v in hues}
@@ -153,7 +153,7 @@ def signed_powers(linear: float, largest: float) -> list[float]:
     """Return 0, the largest power of ten on the axis and one half-way down to its linear range, with both signs."""
     top, bottom = np.floor(np.log10(max(largest, linear))), np.log10(linear)
     powers = sorted({float(f"1e{int(p)}") for p in (np.floor(0.5 * (top + bottom)), top) if p >= bottom})
-    powers = powers[-1:] if PRINTED.get() == "single" else powers
+    powers = powers[-1:] if PRINTED_WIDTH.get() == "single" else powers
     return [*(-p for p in reversed(powers)), 0.0, *powers]
 
 
@@ -170,4 +170,4 @@ def scatter(x: np.ndarray, y: np.ndarray, **look: Any) -> None:
 
 
 def thinned(ends: DataFrame) -> DataFrame:
-    return concat([every_nth(own, MOST_POINTS) for _, own in ends.groupby("variant", sort=False)])
+    return concat([every_nth(own, MOST_ERRORS_DRAWN) for _, own in ends.groupby("variant", sort=False)])

@@ -12,8 +12,8 @@ from armid.report.style import INK, legend_below, line_look, log_axis, panels, r
 from armid.study.analyses.analysis import N_RUNS, SETTING, Analysis, Evidence, every_nth
 
 # Smaller relative errors are drawn there.
-FLOOR = 1e-16
-MOST_POINTS = 800
+LEAST_DRAWN = 1e-16
+MOST_RESULTS_DRAWN = 800
 COLUMNS = (
     SETTING, Column("fitness", "fitness"), Column("identifier", "identifier"), N_RUNS,
     Column("median_error", "largest error, median [%]", ".3g", 100.0),
@@ -79,14 +79,14 @@ def fitness_quality_figure(runs: DataFrame, colours: Mapping[str, int]) -> Any:
         own = runs[(runs["setting"] == setting) & (runs["status"] == "done")]
         for k, name in enumerate(names):
             for _, group in own[own["fitness"] == name].groupby("variant", sort=False):
-                shown = every_nth(group, MOST_POINTS)
-                error = np.maximum(100.0 * shown["largest_error"].to_numpy(float), 100.0 * FLOOR)
+                shown = every_nth(group, MOST_RESULTS_DRAWN)
+                error = np.maximum(100.0 * shown["largest_error"].to_numpy(float), 100.0 * LEAST_DRAWN)
                 look = line_look(colours[str(shown["variant"].iloc[0])])
                 axis.plot(error, k + random.uniform(-0.32, 0.32, error.size), "o", ms=3.0, mfc="none", mew=0.8,
                           mec=look["color"], zorder=look["zorder"])  # fmt: skip
             middle = 100.0 * own.loc[own["fitness"] == name, "largest_error"].median()
             if np.isfinite(middle):
-                axis.plot([max(middle, 100.0 * FLOOR)] * 2, [k - 0.42, k + 0.42], color=INK, lw=2.0, zorder=5)
+                axis.plot([max(middle, 100.0 * LEAST_DRAWN)] * 2, [k - 0.42, k + 0.42], color=INK, lw=2.0, zorder=5)
         row_names(axis, i, names)
         log_axis(axis)
         axis.set(title=setting, xlabel="largest relative error [%]", ylim=(len(names) - 0.5, -0.5))

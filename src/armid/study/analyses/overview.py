@@ -55,7 +55,7 @@ def main_table(evidence: Evidence) -> Table:
 
 OVERVIEW = Analysis("overview", "Overview", lambda evidence: (main_table(evidence),),
                     "errors of all identifiers, without truths their values")  # fmt: skip
-RUNS = Analysis("runs", "Runs", lambda evidence: (
+RUNS_ANALYSIS = Analysis("runs", "Runs", lambda evidence: (
     runs_table(evidence.runs, evidence.parameters), reasons(evidence.runs),
 ), "what was run, and why runs stopped")  # fmt: skip
 

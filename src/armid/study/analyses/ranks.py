@@ -16,20 +16,20 @@ from armid.model import Array
 from armid.problem.suite import DEFINITIONS
 from armid.report.document import Column, Figure, Part, Table, Text, listed, slug
 from armid.report.style import INK, line_look, pyplot
-from armid.study.analyses.analysis import BUDGET, VARIANT, Analysis, Evidence, is_swarm
+from armid.study.analyses.analysis import BUDGET_COLUMN, VARIANT, Analysis, Evidence, is_swarm
 
 # Errors of 1e-6 % and below are all as good as exact: what is left is rounding.
-FLOOR = 1e-8
+ARRIVED_ERROR = 1e-8
 # With noise, a smaller difference than this share of the Cramer-Rao standard deviation is not a difference.
 SHARE_OF_BOUND = 0.01
 # A smaller corrected p tells two identifiers apart. The answer names so many that it does not tell from the best.
-SURE, MOST_ALIKE = 0.05, 4
+SURE_LEVEL, MOST_ALIKE = 0.05, 4
 # An identifier has arrived when more than this share of its runs has.
 HALF = 0.5
 # A critical-difference diagram of fewer cases would say little.
 LEAST_CASES = 20
 # Of so many cases every way to set the signs is counted (8,192), of more Wilcoxon's test is asymptotic.
-MOST_EXACT = 13
+EXACT_TEST_TO = 13
 INTRODUCTION = "How sure is it that one identifier is better than another on cases like these?"
 RANK_CAPTION = (
     "Largest relative error of a run, median over the seeds: one number a case and identifier. A case is one block, "
@@ -103,7 +103,7 @@ def rank_tests(runs: DataFrame, steps: Mapping[str, float] | None = None) -> Ran
     steps: case -> difference of errors below which two are alike, see `steps_of`.
     Source: Demsar, J. Mach. Learn. Res. 7 (2006) 1.
     """
-    raised = runs.assign(largest_error=runs["largest_error"].clip(lower=FLOOR))
+    raised = runs.assign(largest_error=runs["largest_error"].clip(lower=ARRIVED_ERROR))
     blocks = tied(blocks_of(raised, "largest_error"), steps or {})
     statistic, p = friedman(blocks.to_numpy())
     ranks = blocks.rank(axis=1).mean(axis=0).sort_values(kind="stable")
@@ -146,7 +146,7 @@ def arrived(evidence: Evidence, setting: str) -> Series:
     best = evidence.parameters.merge(lowest, on="run")[[*problem, "parameter", "value", "deviation"]]
     both = own.merge(best, on=[*problem, "parameter"], suffixes=("", "_best"))
     bound = np.where(np.isfinite(both["deviation"]), both["deviation"], 0.0)
-    reach = np.maximum(SHARE_OF_BOUND * bound, FLOOR * both["value_best"].abs())
+    reach = np.maximum(SHARE_OF_BOUND * bound, ARRIVED_ERROR * both["value_best"].abs())
     near = ((both["value"] - both["value_best"]).abs() <= reach).groupby(both["run"]).all()
     return shared.assign(near=shared["run"].map(near).eq(True)).groupby("variant", sort=False)["near"].mean()
 
@@ -199,11 +199,11 @@ def signed_rank(first: Array, second: Array) -> float:
     differences = np.where(first == second, 0.0, x - y)
     if len(differences) < 2 or not differences.any():
         return 1.0
-    if len(differences) > MOST_EXACT:
+    if len(differences) > EXACT_TEST_TO:
         return float(wilcoxon(differences, zero_method="pratt").pvalue)
     # `wilcoxon` counts the same signs one by one, in Python: seconds a pair
     return float(permutation_test((differences,), signed_ranks, permutation_type="samples", vectorized=True,
-                                  n_resamples=2**MOST_EXACT).pvalue)  # fmt: skip
+                                  n_resamples=2**EXACT_TEST_TO).pvalue)  # fmt: skip
 
 
 def signed_ranks(differences: Array, axis: int) -> Array:
@@ -334,7 +334,7 @@ def class_ranks(evidence: Evidence) -> Table:
             text = f"{mean:.2f} ({low:.2f} to {high:.2f})"
             rows.append((setting, variant, len(ranks), mean, low, high, text, n_first, *classes[variant]))
     names = ["setting", "variant", "n", "rank", "low", "high", "text", "first", *present]
-    columns = (BUDGET, VARIANT, Column("n", "cases", ".0f"), Column("text", "mean rank"),
+    columns = (BUDGET_COLUMN, VARIANT, Column("n", "cases", ".0f"), Column("text", "mean rank"),
                Column("first", "first", ".0f"), *(Column(c, c, ".2f") for c in present))  # fmt: skip
     return Table("by_class", "Ranks by class of difficulty", CLASS_CAPTION, DataFrame(rows, columns=names), columns,
                  grouped=True)  # fmt: skip
@@ -373,7 +373,7 @@ def swarm_pairs(evidence: Evidence) -> Table:
     for setting in evidence.settings:
         swarm = next((v for v in evidence.once(final_values, setting).columns if is_swarm(v)), None)
         rows += [(setting, swarm, *line) for line in against(evidence, setting, swarm)] if swarm else []
-    columns = (BUDGET, Column("swarm", "swarm"), Column("variant", "against"), Column("ratio", "ratio", ".3g"),
+    columns = (BUDGET_COLUMN, Column("swarm", "swarm"), Column("variant", "against"), Column("ratio", "ratio", ".3g"),
                Column("p", "p, Holm", ".2g"))  # fmt: skip
     frame = DataFrame(rows, columns=[column.key for column in columns])
     return Table("swarm", "The paper's swarm against the others", SWARM_CAPTION, frame, columns, grouped=True)
@@ -396,7 +396,7 @@ def against(evidence: Evidence, setting: str, one: str) -> list[tuple[str, float
 
 def alike_text(others: Sequence[tuple[str, float]], n_cases: int) -> str:
     """Return which others the tests cannot tell from the best, "" without others. others: with their corrected p."""
-    alike = [name for name, p in others if not p < SURE]
+    alike = [name for name, p in others if not p < SURE_LEVEL]
     more = f" and {len(alike) - MOST_ALIKE} more" if len(alike) > MOST_ALIKE else ""
     if not alike:
         return "; it is better than each other by the tests" if others else ""
@@ -420,7 +420,7 @@ def suite_answer(evidence: Evidence) -> tuple[str, ...]:
         line += f" of {len(own)}{alike}."
         line += "".join(f" Your own {v} {standing(own, v)}." for v in own["variant"] if v in evidence.own)
         if len(tested):
-            swarm, sure = own[own["variant"] == tested["swarm"].iloc[0]].iloc[0], tested["p"] < SURE
+            swarm, sure = own[own["variant"] == tested["swarm"].iloc[0]].iloc[0], tested["p"] < SURE_LEVEL
             others = own[own["variant"] != swarm["variant"]]
             leads = [name for name in classes if swarm[name] < others[name].min()]
             wins, losses = (int((sure & better).sum()) for better in (tested["ratio"] < 1.0, tested["ratio"] > 1.0))

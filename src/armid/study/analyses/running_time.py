@@ -14,11 +14,11 @@ from pandas import DataFrame
 from armid.report.document import Column, Figure, Part, Table
 from armid.report.style import LEAST_HEIGHT, named_lines, panels
 from armid.study.analyses.analysis import N_RUNS, SETTING, TARGETS, VARIANT, Analysis, Evidence
-from armid.study.analyses.success import TOLERANCES
+from armid.study.analyses.success import SUCCESS_TOLERANCES
 
 Array = NDArray[np.floating[Any]]
 PAIRS_HIT = "share of (run, target) pairs hit"
-SHARES: Any = {"xscale": "log", "ylim": (0.0, 1.0)}
+SHARE_AXES: Any = {"xscale": "log", "ylim": (0.0, 1.0)}
 # Of both targets.
 CAPTION = (
     "ERT = (simulations of all runs until the target is first hit, all that were used where it is not) / (number of "
@@ -44,7 +44,7 @@ def parts(evidence: Evidence) -> Sequence[Part]:
     if not evidence.knows_truth:
         return ()
     hits = evidence.histories.error_hits
-    shown = {f"{100 * t:g} %": t for t in TOLERANCES}
+    shown = {f"{100 * t:g} %": t for t in SUCCESS_TOLERANCES}
     label = "largest relative error of the best candidate [%]"
     title = "Expected running time to the truth [simulations]"
     return (
@@ -102,7 +102,7 @@ def ecdf_figure(evidence: Evidence) -> Any:
     kept = evidence.histories
     curves = [(setting, kept.grid, {v: share_hit(kept.error_hits[rows], kept.grid) for v, rows in variants.items()})
               for setting, variants in evidence.groups.items()]  # fmt: skip
-    return line_panels(curves, evidence.colours, xlabel="simulations", ylabel=PAIRS_HIT, **SHARES)
+    return line_panels(curves, evidence.colours, xlabel="simulations", ylabel=PAIRS_HIT, **SHARE_AXES)
 
 
 def line_panels(
@@ -138,7 +138,7 @@ def powers_around(lines: Iterable[Array]) -> tuple[float, float]:
 
 # Parts of the way to the best known value that may be left.
 SHARES_LEFT = (1e-1, 1e-3, 1e-5)
-N_GRID = 200
+N_OF_TIMES = 200
 BEST_TARGET = (
     "Target: of the way from a first candidate (median of the first fitness of all runs on the case) to the best "
     "fitness that any identifier found on the same case, noise and seed, no more than this share is left. Where "
@@ -196,17 +196,17 @@ def data_profile_figure(evidence: Evidence) -> Any:
     for (setting, variants), share in product(evidence.groups.items(), SHARES_LEFT):
         place = int(np.flatnonzero(share * (1.0 + 1e-9) >= TARGETS)[0])
         least = min(int(n_free[rows].min()) for rows in variants.values()) + 1
-        grid = np.geomspace(1.0, int(kept.grid[-1]) / least, N_GRID)
+        grid = np.geomspace(1.0, int(kept.grid[-1]) / least, N_OF_TIMES)
         lines = {v: data_profile(kept.value_hits[rows, place], n_free[rows], grid) for v, rows in variants.items()}
         curves.append((f"{setting}, {share:g} left", grid, lines))
     return line_panels(curves, evidence.colours, columns, 6.6, xlabel="simulations / (free parameters + 1)",
-                       ylabel="share of problems solved", **SHARES)  # fmt: skip
+                       ylabel="share of problems solved", **SHARE_AXES)  # fmt: skip
 
 
 def waterfall_figure(evidence: Evidence) -> Any:
     """Draw what the runs leave of the way to the best known fitness, sorted, a panel for each setting."""
     n_hit = np.isfinite(evidence.histories.value_hits).sum(axis=1)
-    left, shares = TARGETS[np.maximum(n_hit - 1, 0)], np.linspace(0.0, 1.0, N_GRID)
+    left, shares = TARGETS[np.maximum(n_hit - 1, 0)], np.linspace(0.0, 1.0, N_OF_TIMES)
     curves = [(setting, 100.0 * shares,
                {v: np.quantile(left[rows], shares, method="inverted_cdf") for v, rows in variants.items()})
               for setting, variants in evidence.groups.items()]  # fmt: skip

@@ -10,9 +10,9 @@ from armid.report.document import Column, Figure, Part, Table
 from armid.report.style import draw_intervals, legend_below, mark_handles, panels, row_names
 from armid.study.analyses.analysis import N_RUNS, SETTING, VARIANT, Analysis, Evidence
 
-TOLERANCES = (1e-2, 1e-3, 1e-4)
+SUCCESS_TOLERANCES = (1e-2, 1e-3, 1e-4)
 # Distance of two tolerances in a row of the figure.
-APART = 0.24
+BARS_APART = 0.24
 TABLE_CAPTION = (
     "A run succeeds when the relative errors of all parameters of its result are within the tolerance; a failed run "
     "does not. In brackets the 95 % Wilson interval of the rate. Runs of all cases and seeds count alike."
@@ -35,7 +35,7 @@ def parts(evidence: Evidence) -> Sequence[Part]:
 SUCCESS = Analysis("success", "Success rates", parts, "share of runs with all parameters within 1, 0.1 and 0.01 %")
 
 
-def success_rates(runs: DataFrame, tolerances: Sequence[float] = TOLERANCES) -> DataFrame:
+def success_rates(runs: DataFrame, tolerances: Sequence[float] = SUCCESS_TOLERANCES) -> DataFrame:
     """Return, per setting, variant and tolerance: runs, successes, rate and its 95 % Wilson interval.
 
     A failed run is not a success. Source: Wilson, J. Am. Stat. Assoc. 22 (1927) 209.
@@ -78,7 +78,7 @@ def success_figure(rates: DataFrame, colours: Mapping[str, int]) -> Any:
     figure, axes = panels(len(settings), 2, 6.8, 1.6 + 0.36 * len(variants))
     for i, (axis, setting) in enumerate(zip(axes, settings, strict=True)):
         for j, (_, own) in enumerate(rates[rates["setting"] == setting].groupby("tolerance", sort=False)):
-            heights = own["variant"].map({v: k for k, v in enumerate(variants)}).to_numpy(float) + APART * (j - 1)
+            heights = own["variant"].map({v: k for k, v in enumerate(variants)}).to_numpy(float) + BARS_APART * (j - 1)
             rate, low, high = (100.0 * own[key].to_numpy() for key in ("rate", "low", "high"))
             draw_intervals(axis, rate, heights, low, high, j, own["variant"].map(colours))
         row_names(axis, i, variants)

@@ -44,9 +44,9 @@ LAYOUT_CAPTION = (
     "ours to a simulated one: medians over the seeds. 0.000 is an error below 0.0005 %."
 )
 DEVIATION_CAPTION = " deviation: standard deviation of the population."
-PRINTED = ("truth", "value", "relative_error")
+PRINTED_PARTS = ("truth", "value", "relative_error")
 # Smaller errors are drawn there [%].
-FLOOR = 1e-9
+DRAWN_FROM = 1e-9
 RESAMPLES = 2000
 # Numbers that a batch of resamples may hold at once.
 BATCH_NUMBERS = 4_000_000
@@ -106,8 +106,10 @@ def paper_layout(evidence: Evidence, title: str, with_truth: bool) -> Table:
         of = {name: block[block["parameter"] == name] for name in names}
         for case in dict.fromkeys(block["case"]):
             at = [rows_of[rows_of["case"] == case] for rows_of in of.values()]
-            rows.append((source, case, *(float(a[key].iloc[0]) if len(a) else np.nan for a in at for key in PRINTED)))
-        values = [[rows_of[key].mean() for key in PRINTED[1:]] for rows_of in of.values()]
+            rows.append(
+                (source, case, *(float(a[key].iloc[0]) if len(a) else np.nan for a in at for key in PRINTED_PARTS))
+            )
+        values = [[rows_of[key].mean() for key in PRINTED_PARTS[1:]] for rows_of in of.values()]
         means = [(np.nan, np.nan if with_truth else mean, error) for mean, error in values]
         rows.append((source, "mean", *(x for group in means for x in group)))
         if not with_truth:
@@ -198,7 +200,7 @@ def table1_figure(estimates: DataFrame, published: DataFrame, colours: Mapping[s
             draw_boxes(axis, own[own["setting"] == setting], variants, colours, j, len(settings))
         errors = 100.0 * published.loc[published["parameter"] == name, "relative_error"].to_numpy()
         axis.axvline(errors.mean(), color="black", lw=1.2, ls="--", zorder=0)
-        axis.plot(np.maximum(errors, FLOOR), np.full(errors.size, -0.5), "D", color="black", ms=5, clip_on=False,
+        axis.plot(np.maximum(errors, DRAWN_FROM), np.full(errors.size, -0.5), "D", color="black", ms=5, clip_on=False,
                   zorder=5)  # fmt: skip
         row_names(axis, i, variants)
         axis.set(xscale="log", ylim=(len(variants) - 0.4, -0.6), title=name, xlabel="relative error [%]")
@@ -216,7 +218,7 @@ def draw_boxes(axis: Any, own: DataFrame, variants: Sequence[str], colours: Mapp
         colour = line_look(colours[variant])["color"]
         line = {"color": colour, "lw": 1.2, "ls": dash_of(j)}
         axis.boxplot(
-            [np.maximum(errors, FLOOR)], positions=[i + width * (j - (n - 1) / 2.0)], orientation="horizontal",
+            [np.maximum(errors, DRAWN_FROM)], positions=[i + width * (j - (n - 1) / 2.0)], orientation="horizontal",
             whis=(5, 95), widths=0.8 * width, manage_ticks=False, medianprops={"color": colour, "lw": 2.4},
             boxprops=line, whiskerprops=line, capprops=line | {"ls": "-"},
             flierprops={"marker": ".", "ms": 2.5, "mfc": colour, "mec": "none", "alpha": 0.6},
