@@ -99,7 +99,7 @@ def test_noise_from_differences_and_a_lacking_model_are_told(lowering_found):
         information=replace(lowering_found.information, levels=(level,)),
     )  # fmt: skip
     said = "\n".join(remarks(told))
-    assert "from high-frequency differences of the motion, as no rest with still inputs is long and fine" in said
+    assert "from high-frequency differences of the motion: no rest with still inputs has 50 samples" in said
     assert "this many times the noise: 300 in lower.csv: the model lacks something" in said
 
 

@@ -341,4 +341,5 @@ def noise_remark(replay: Replay) -> str:
     if noise.source == "rest":
         mean = shown(noise.mean or 0.0, unit)[0]
         return f"{text} and mean {mean:+.3g} {name} (shown, not subtracted) from {noise.n_samples} samples at rest."
-    return f"{text} from high-frequency differences of the motion, as no rest with still inputs is long and fine."
+    return (f"{text} from high-frequency differences of the motion: no rest with still inputs has 50 samples, or the "
+            "steps of the sensor hide it there.")  # fmt: skip

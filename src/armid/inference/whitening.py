@@ -197,7 +197,7 @@ class WhitenedData:
         return np.concatenate(weights)
 
 
-@lru_cache(maxsize=16)  # many models are asked for the same parts of the records
+@lru_cache(maxsize=6)  # many models are asked for the same five parts of the records; each takes 100 MB of the link
 def blocks_of_rows(blocks: tuple[Block, ...], weights: bytes) -> tuple[Block, ...]:
     """Return blocks where samples have weights, (n_samples,)."""
     rows = np.frombuffer(weights)
