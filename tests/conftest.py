@@ -128,7 +128,7 @@ def refused(run: Callable[..., Ran]) -> Callable[..., str]:
         assert (ran.code, ran.out) == (2, "")
         assert ran.err.startswith("armid: ")
         assert ran.err.count("\n") == 1
-        assert len(ran.err) <= len("armid: ") + errors.LONGEST + 1
+        assert len(ran.err) <= len("armid: ") + errors.LONGEST_SENTENCE + 1
         return ran.err
 
     return sentence

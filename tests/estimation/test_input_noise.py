@@ -220,7 +220,7 @@ def test_inputs_count_as_exact_where_the_records_are_more_probable_so(tmp_path):
     """What a controller computes of a noisy speed looks as if it were measured with noise, and is exact."""
 
     def computed(seed):
-        return torque(seed) + np.random.default_rng(seed).normal(0.0, TORQUE_NOISE, len(TIMES))
+        return torque(seed + 200) + np.random.default_rng(seed + 200).normal(0.0, TORQUE_NOISE, len(TIMES))
 
     records = campaign(tmp_path / "axis", exact, computed)
     records = replace(records, records=tuple(replace(r, input_noise={"u": InputNoise(rms=TORQUE_NOISE)})

@@ -84,10 +84,14 @@ class Inference:
         """
         if self.standing is not None:
             return self.standing
-        named = [m for m, _ in self.exploration.ranked() if not any(h.kind == "unknown" for h in m)]
         if self.posterior.probability("unknown") < MENTIONED:
-            return named[0]
-        return predicting_best(named, self.exploration.fits, self.exploration.library)
+            return self.named[0]
+        return predicting_best(self.named, self.exploration.fits, self.exploration.library)
+
+    @property
+    def named(self) -> list[Hypotheses]:
+        """The models whose parts all have names, the most probable first."""
+        return [m for m, _ in self.exploration.ranked() if not any(h.kind == "unknown" for h in m)]
 
     def without(self, denied: Hypotheses, standing: Hypotheses) -> "Inference":
         """Return what is probable where held-out records deny some hypotheses; standing: the model that is left."""
@@ -287,19 +291,21 @@ def infer(library: Library, declared: Fit) -> Inference:
     inference = inferred(library, declared)
     if not pooled_noise(library.data.records):
         return inference
-    fit, exact = inference.exploration.fits[inference.in_force], library
+    exact = library
     if library.as_read is not None:
-        exact = library.with_data(library.as_read)
+        fit, exact = inference.exploration.fits[inference.named[0]], library.with_data(library.as_read)
         problem = exact.problem(fit.active, fit.values)
-        if fit_from(problem, fit.active, [start_of(problem, fit.values)]).log_density > fit.log_density:
+        again = accurate(fit_from(problem, fit.active, [start_of(problem, fit.values)]), exact)
+        if again.log_density > fit.log_density:
             library.say("the inputs count as exact: the records are more probable so")
             return inferred(exact, declared_again(exact, declared))
+    fit = inference.exploration.fits[inference.in_force]
     if fit.active and inference.posterior.probability("unknown") >= MENTIONED:
         # the declared model may answer to its inputs quite otherwise
-        again = with_measured_inputs(exact, fit)
-        if may_be_all(again, fit):
+        answering = with_measured_inputs(exact, fit)
+        if may_be_all(answering, fit):
             library.say("the same with the noise of the inputs as the best model answers to it")
-            return inferred(again, declared_again(again, declared))
+            return inferred(answering, declared_again(answering, declared))
     return inference
 
 
