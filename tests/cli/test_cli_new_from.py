@@ -6,6 +6,7 @@ from warnings import catch_warnings, simplefilter
 import numpy as np
 import pytest
 
+from armid import read_campaign
 from armid.record.table import read_table
 
 N, INTERVAL = 2000, 0.004
@@ -101,6 +102,17 @@ def test_a_parameter_among_the_constants_is_refused_with_the_key_to_write(run, r
     assert "is a parameter of plant 'rotary_arm', [parameters.gain] with fixed = VALUE is" in refused("check", "mine")
     sheet.write_text(guessed.replace("[[records]]", "[parameters.gain]\nfixed = 0.5\n\n[[records]]", 1))
     assert "with parameters in the middle of their ranges, measured up to" in run("check", "mine").out
+
+
+def test_an_encoder_that_is_not_used_does_not_stop_the_campaign(run, tmp_path):
+    """Its counts would be an output, which wants those of a turn."""
+    times, drive, speed, angle = wheel(4)
+    counts = np.round(angle * 4096 / (2.0 * np.pi)).astype(int)
+    rows = "\n".join(f"{t:.3f},{u:.3f},{c},{v:.4f}" for t, u, c, v in zip(times, drive, counts, speed, strict=True))
+    (tmp_path / "a.csv").write_text(f"time_s,pwm_V,angle_counts,gyro_rad_s\n{rows}\n")
+    assert run("new", "campaign", "mine", "--from", "a.csv").code == 0
+    assert "angle_counts, with counts_per_turn" in (tmp_path / "mine" / "campaign.toml").read_text()
+    assert [s.header for s in read_campaign(tmp_path / "mine").train[0].signals] == ["angular_velocity_rad_s"]
 
 
 @pytest.mark.parametrize(("text", "words"), [

@@ -17,7 +17,7 @@ from armid.cli.main import main
 from armid.cli.report import LOOP, document_of, kind_in, refuse_damaged
 from armid.errors import ArmidError
 from armid.loop.document import chances_sentence, loop_document
-from armid.report.document import Document, Line, Listing, Section, Sentences, rmse_text, table, varying
+from armid.report.document import Document, Line, Listing, Section, Sentences, rmse_text, table, value_text, varying
 from armid.report.files import csv, latex, markdown
 from armid.report.html import html, inline
 from armid.report.style import legend_below, panels, row_names, svg_text, thinned
@@ -338,3 +338,11 @@ def test_a_column_that_is_empty_in_some_lines_is_not_told_as_the_same_in_all():
     assert [c.key for c in columns] == ["name", "unit", "before"]
     assert [[c.text for c in row] for row in cells] == [list(row[:3]) for row in rows]
     assert note == "In every line said is a."
+
+
+@pytest.mark.parametrize(("value", "low", "high", "text"), [
+    (0.0118, 0.011, 0.013, "0.0118 kg m2 (0.011 to 0.013)"),
+    (0.01180006, 0.01179978, 0.01180033, "0.01180006 kg m2 (0.01179978 to 0.01180033)"),
+])  # fmt: skip
+def test_an_interval_is_shown_with_digits_that_tell_its_ends_apart(value, low, high, text):
+    assert value_text({"unit": "kg m2", "value": value, "low": low, "high": high, "interval_holds": True}) == text

@@ -225,6 +225,7 @@ HEADERS = {
 DRIVEN_IN = {"mV": ("V", 1e-3), "kV": ("V", 1e3), "mA": ("A", 1e-3), "kN": ("N", 1e3), "mN m": ("N_m", 1e-3),
              "mNm": ("N_m", 1e-3), "kNm": ("N_m", 1e3), "kN m": ("N_m", 1e3)}  # fmt: skip
 LINEAR, DRIVES = {"m", "mm", "m_s", "mm_s", "N"}, {"V", "A", "N", "N_m"}
+COUNT_ENDS = ("counts", "counts_s")
 TURNING_ENDS = {*SUFFIXES["rad/s"], *SUFFIXES["rad"]}
 # A machine is at rest as long as its signal is nearer to its first rows than so many times their range.
 BEYOND_REST = 2.5
@@ -302,6 +303,8 @@ def guessed_campaign(name: str, files: Sequence[Path]) -> tuple[str, dict[str, d
     written = {table.file: rewritten(table, renamed, roles["time"].header, second, drive) for table in tables}
     unused = [header for header in tables[0].columns if header not in (roles["time"].header, *renamed)]
     notes += [f"not used: {', '.join(map(quoted, unused))}"] if unused else []
+    if any(column_of(h).end in COUNT_ENDS for h in unused):
+        notes.append("counts of an encoder are an angle as angle_counts, with counts_per_turn in this file")
     return guessed_text(name, tables, roles, written, renamed, linear, notes), written
 
 
@@ -330,7 +333,7 @@ def roles_of(table: CsvTable) -> dict[str, Column]:
     if "speed" in roles and roles.get("position", Column("", "", "")).end == "counts":
         del roles["position"]
     for quantity in ("speed", "position"):
-        if quantity in roles and roles[quantity].end in ("counts", "counts_s"):
+        if quantity in roles and roles[quantity].end in COUNT_ENDS:
             raise ArmidError(f"{table.where}: {quoted(roles[quantity].header)} is in counts, and how many "
                              "make a turn is not known: an angle or a speed in deg, rad or turns is expected, or a "
                              "campaign.toml of your own with counts_per_turn")  # fmt: skip
@@ -381,7 +384,10 @@ def rewritten(
         table.numbers(header, gaps=header != time) if header in table.headers else missing(table, header)
     times = table.columns[time] if second == 1.0 else np.round(table.columns[time] * second, 12)
     taken = {"time_s", *renamed.values()}
-    others = {h: v for h, v in table.columns.items() if h not in (time, *renamed) and h not in taken and "," not in h}
+    # an encoder that is not used must not be taken for an output, which wants the counts of a turn
+    kept = {h: f"unused_{h}" if column_of(h).end in COUNT_ENDS else h for h in table.columns
+            if h not in (time, *renamed) and h not in taken and "," not in h}  # fmt: skip
+    others = {new: table.columns[h] for h, new in kept.items()}
     own = {new: table.columns[h] * (drive[1] if new == drive[0] else 1.0) for h, new in renamed.items()}
     return {"time_s": times} | own | others
 

@@ -9,6 +9,7 @@ import numpy as np
 from armid.errors import ArmidError
 from armid.estimation.identify import versions_of
 from armid.estimation.identify_document import PACKAGES_OF_IDENTIFY
+from armid.inference.candidates import ERROR_OF
 from armid.inference.carry_over import missed_sentences
 from armid.inference.checks import Finding, Residuals, time_in_words
 from armid.inference.decisions import LISTED, OVER_NOISE, SIGNIFICANCE
@@ -128,6 +129,7 @@ def loop_document(
     note = records_note(len(rows) // 2, details["n_records"])
     by_record = error_table("Errors of each record", ["record", "role", "model"], rows, unit, note)
     steps: tuple[Part, ...] = (step_table(report),) if report["steps"] else ()
+    steps += (Sentences((details["declared_by"],)),) if details.get("declared_by") else ()
     shifts = (*details["suspects"], *details["shifts"])
     together = tuple(f"{said[0].upper()}{said[1:]}." for said in report["known_together"])
     beside = [Sentences((*shifts, *together))] if shifts or together else []
@@ -339,6 +341,7 @@ def details_of(loop: ClosedLoop) -> dict[str, Any]:
         "shifts": shift_sentences(before, after) if loop.steps else [],
         "doubts": doubt_sentences(after),
         "suspects": [fault_sentence(s) for s in loop.suspects],
+        "declared_by": declared_by(loop),
         "diagnosis": diagnoses if loop.steps else diagnoses | {"after": None},
         "missing": missing_sentences(loop.missing) if loop.missing is not None else [],
         "equations": {"before": str(before.model), "after": str(after.model)},
@@ -404,6 +407,17 @@ def nothing_missing(loop: ClosedLoop) -> str:
 def as_noise(loop: ClosedLoop) -> str:
     seen = loop.after.diagnosis
     return f"differs little from noise (chance {seen.p:.2g})" if seen.significant else "is noise"
+
+
+def declared_by(loop: ClosedLoop) -> str:
+    """Say by which options `identify` takes the effects that were added, in the shapes that were found; "" for none."""
+    fit, library = loop.after.fit, loop.inference.exploration.library
+    if not loop.steps or any(key.name.startswith(ERROR_OF) for key in fit.active):
+        return ""
+    names = ",".join(f"{s.effect}:{s.form}" if s.form else s.effect for s in loop.steps)
+    shapes = [f" --fix {key.public}.{name.partition('.')[2]}={fit.values[name]:.6g}" for key in fit.active
+              for name in library.fixed_shapes(key) if name in fit.values]  # fmt: skip
+    return f"`armid identify` declares this model with `--effects {names}{''.join(shapes)}`."
 
 
 def unclaimed(loop: ClosedLoop) -> str:

@@ -267,8 +267,12 @@ def unlike(names: list[str]) -> list[str]:
 MOST_RECORDS = 24
 # What is left of a model and is below this many times what noise of sensor and inputs does may be that alone.
 NO_MORE = 1.5
+# Digits of a parameter, and at most, where its interval is narrow.
+USUAL_DIGITS, MOST_DIGITS = 5, 8
 # Of what noise of the inputs does a fit leaves at least this share, as parameters cannot follow it.
 LEFT_OF_MOVED = 0.25
+# Of what a model leaves, noise of the inputs that does less than this share shows nowhere.
+LEAST_OF_LEFT = 0.03
 ERROR_NOTE = (
     "RMSE: pooled over all samples. NRMSE: each record divided by its rms. chi2/sample: mean of (residual/noise)^2, 1 "
     "where only noise is left. S, S1, S2: similarity degrees of the paper (whole, numbers, shape), mean by duration; "
@@ -299,11 +303,21 @@ def value_text(entry: Mapping[str, Any], struck: bool = False) -> str:
     struck: whether an interval that does not hold is shown struck through; else it is left out.
     """
     name, factor = scale_of(entry["unit"], entry["value"])
-    text = f"{factor * entry['value']:.5g}{'' if name == '1' else f' {name}'}"
-    if entry["low"] is None or entry["high"] is None or not (entry["interval_holds"] or struck):
+    ends = () if entry["low"] is None or entry["high"] is None else (entry["low"], entry["high"])
+    digits = digits_of(entry["value"], *ends)
+    text = f"{factor * entry['value']:.{digits}g}{'' if name == '1' else f' {name}'}"
+    if not ends or not (entry["interval_holds"] or struck):
         return text
-    text += f" ({factor * entry['low']:.5g} to {factor * entry['high']:.5g})"
+    text += f" ({factor * ends[0]:.{digits}g} to {factor * ends[1]:.{digits}g})"
     return text if entry["interval_holds"] else Struck(text)
+
+
+def digits_of(value: float, low: float | None = None, high: float | None = None) -> int:
+    """Return the digits that show a value, and two digits of the width of its interval."""
+    if low is None or high is None or not high > low or value == 0.0:
+        return USUAL_DIGITS
+    wanted = 2 + int(np.ceil(np.log10(max(abs(low), abs(high)) / (high - low))))
+    return int(np.clip(wanted, USUAL_DIGITS, MOST_DIGITS))
 
 
 def stored_figures(titles: Mapping[str, tuple[str, str]], svgs: Mapping[str, str]) -> dict[str, tuple[Figure, ...]]:
@@ -405,9 +419,12 @@ def may_be_inputs(noise: float, moved: float, left: float | None) -> bool:
 def inputs_act(noise: float, moved: float, left: float | None) -> bool:
     """Tell whether noise of the inputs moves an output by more than its own noise, and shows in what is left, an RMSE.
 
-    Where it does not show, the inputs are exact: their steps are those of a command.
+    Where it does not show, the inputs are exact: their steps are those of a command. Beside much larger errors it does
+    not show either.
     """
-    return left is not None and moved >= noise and left > float(np.hypot(noise, LEFT_OF_MOVED * moved))
+    if left is None or moved < max(noise, LEAST_OF_LEFT * left):
+        return False
+    return left > float(np.hypot(noise, LEFT_OF_MOVED * moved))
 
 
 def rmse_text(error: Mapping[str, Any], unit: str) -> str:
