@@ -14,7 +14,7 @@ from armid.estimation.constants import moved_record
 from armid.estimation.corrections import DataIssue
 from armid.inference.decisions import calibration
 from armid.loop import close_loop, report_of
-from armid.loop.document import conclusion, details_of, loop_document
+from armid.loop.document import conclusion, declared_by, details_of, loop_document
 from armid.model import EFFECTS, Model
 from armid.record import read_campaign
 from armid.record.campaign import tolerances_of
@@ -422,6 +422,20 @@ def test_a_conclusion_is_what_the_tests_say():
     assert "b cannot be told from c or d" in group
     assert "a has a probability" not in group
     assert "b has a probability of 0.60" in concluded("cannot_tell_apart", ("a", "b"), "a")
+
+
+@pytest.mark.filterwarnings("ignore:every train record")
+def test_identify_takes_what_was_found_by_the_options_that_are_printed(axis):
+    campaign = axis()
+    found = armid.close_loop(campaign, candidates=["viscous"], curve=False)
+    said = declared_by(found)
+    assert said.startswith("`armid identify` declares this model with `--effects viscous --bounds viscous.slope=0:")
+    name, _, ends = said.rstrip("`.").rpartition(" ")[2].partition("=")
+    bounds = {name: tuple(float(end) for end in ends.split(":"))}
+    again = armid.identify(campaign, identifier="least_squares", effects="viscous", bounds=bounds)
+    slope = next(e.value for e in found.after.estimates if e.name == name)
+    assert again.parameters[name].value == pytest.approx(slope, rel=1e-3)
+    assert declared_by(armid.close_loop(campaign, effects=["viscous"], candidates=["coulomb"], curve=False)) == ""
 
 
 def test_what_is_known_of_a_parameter_beforehand_counts(axis):

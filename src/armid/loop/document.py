@@ -69,6 +69,8 @@ TIMES_IN_WORDS = {
     "direction": ", times the direction of motion,",
     "drive_effort": ", times the effort of the drive,",
 }
+# How many times what was found of a strength a search for it may reach.
+SEARCHED_TO = 4.0
 # A shift of a parameter by more than this share of its value, and of its interval, is listed.
 SHIFTED = 0.01
 MOST_FINDINGS, MOST_PORTS, MOST_EXACT, MOST_DRAWN = 3, 5, 5, 6
@@ -410,14 +412,24 @@ def as_noise(loop: ClosedLoop) -> str:
 
 
 def declared_by(loop: ClosedLoop) -> str:
-    """Say by which options `identify` takes the effects that were added, in the shapes that were found; "" for none."""
+    """Say by which options `identify` takes the effects that were added, in the shapes that were found; "" for none.
+
+    A strength is searched up to some times what was found: far from the answer a motion has many minima.
+    """
     fit, library = loop.after.fit, loop.inference.exploration.library
     if not loop.steps or any(key.name.startswith(ERROR_OF) for key in fit.active):
         return ""
-    names = ",".join(f"{s.effect}:{s.form}" if s.form else s.effect for s in loop.steps)
-    shapes = [f" --fix {key.public}.{name.partition('.')[2]}={fit.values[name]:.6g}" for key in fit.active
-              for name in library.fixed_shapes(key) if name in fit.values]  # fmt: skip
-    return f"`armid identify` declares this model with `--effects {names}{''.join(shapes)}`."
+    options = [",".join(f"{s.effect}:{s.form}" if s.form else s.effect for s in loop.steps)]
+    for key in fit.active:
+        for one in library.candidates[key.declared].parameters:
+            name, public = f"{key.compiled}.{one.name}", f"{key.public}.{one.name}"
+            if name in library.fixed_shapes(key) and name in fit.values:
+                options.append(f"--fix {public}={fit.values[name]:.6g}")
+            elif one.null is not None and name in fit.values:
+                null = fit.model.parameters[name].null or 0.0
+                low, high = sorted((null, null + SEARCHED_TO * (fit.values[name] - null)))
+                options.append(f"--bounds {public}={low:.3g}:{high:.3g}")
+    return f"`armid identify` declares this model with `--effects {' '.join(options)}`."
 
 
 def unclaimed(loop: ClosedLoop) -> str:
