@@ -118,8 +118,8 @@ def at_rest(record: Record, piece: Piece, values: Array) -> Mask:
     columns = [(values, 0.0, False), *((y, float(np.max(np.abs(y))), is_speed) for y, is_speed in outputs)]
     still = np.zeros(values.size, dtype=np.bool_)
     for way in (slice(None), slice(None, None, -1)):
-        _, n, *_ = [0, 0, *lengths_of_rest([(x[way], size, is_speed) for x, size, is_speed in columns])][::-1]
-        still[way][:n] = True
+        lengths = [*lengths_of_rest([(x[way], size, is_speed) for x, size, is_speed in columns])]
+        still[way][: lengths[-2] if len(lengths) > 1 else 0] = True
     return still
 
 
