@@ -81,12 +81,12 @@ OWN = [n for n, i in IDENTIFIERS.items() if not i.package]
 NAMES = (*OWN, "pso+bobyqa", "de+nelder_mead+sbplx", "cmaes+least_squares", "multistart:lbfgs")
 SCRIPT = """
 import hashlib, json, sys
-from armid.contract.check import BUDGET, Trial, run
+from armid.contract.check import TRIAL_BUDGET, Trial, run
 from armid.identifiers import IDENTIFIERS, identifier_of
 from armid.problem.meter import Meter
 found = {}
 for name in sys.argv[1:]:
-    log = run(identifier_of(name, IDENTIFIERS), 7, Trial(Meter(BUDGET), holes=True))[0].log()
+    log = run(identifier_of(name, IDENTIFIERS), 7, Trial(Meter(TRIAL_BUDGET), holes=True))[0].log()
     found[name] = hashlib.sha256(log.X.tobytes() + log.F.tobytes()).hexdigest()
 print(json.dumps(found))
 """
