@@ -29,7 +29,7 @@ from armid.cli.options import (
     value_of,
 )
 from armid.cli.report import show_and_save
-from armid.errors import ArmidError, nearest
+from armid.errors import INTERRUPTED, ArmidError, nearest
 from armid.progress import status_line
 from armid.report.result import IDENTIFIABILITY, IDENTIFICATION, LOOP, refuse_unwritable
 
@@ -137,7 +137,7 @@ def identify_command(
                          **given(**problem))  # fmt: skip
     show_and_save(identification, out)
     if identification.stopped == WAS_INTERRUPTED:
-        sys.exit(130)
+        sys.exit(INTERRUPTED)
 
 
 @command("identifiability", short_help="Say how well the records pin down the parameters.", epilog=examples(

@@ -9,6 +9,7 @@ import click
 
 from armid.cli.options import command, examples, give, out_option, plugin_option, present, say, speaks, tell
 from armid.cli.report import made_by
+from armid.errors import INTERRUPTED, ArmidError
 
 if TYPE_CHECKING:
     from armid.study.runner import Ending
@@ -73,7 +74,7 @@ def study_command(
     counts = {key: getattr(ending.counts, key) for key in ("planned", "done", "failed", "missing")}
     give(study=known.name, folder=ending.folder, answer=answer, **counts, interrupted=ending.interrupted)
     if ending.interrupted:
-        sys.exit(130)
+        sys.exit(INTERRUPTED)
 
 
 def words(ending: "Ending") -> list[str]:
@@ -113,7 +114,6 @@ def tune_command(
     kept in the folder `training` of the results, whatever ends the program; the same command goes on where it was. A
     configuration that fails counts as area 0. Ends with 130 after Ctrl-C. Needs Optuna.
     """
-    from armid.errors import ArmidError
     from armid.report.result import NewFiles
     from armid.study.runner import OUT, absolute, progress_bar
     from armid.study.tasks import Study, read_study
@@ -143,4 +143,4 @@ def tune_command(
          areas={tuning.label: {"default": tuning.default, "tuned": tuning.tuned} for tuning in tunings},
          interrupted=ending.interrupted)  # fmt: skip
     if ending.interrupted:
-        sys.exit(130)
+        sys.exit(INTERRUPTED)

@@ -309,9 +309,8 @@ def level_remarks(examination: Examination) -> list[str]:
     for replay, level in zip(examination.replays, examination.information.levels, strict=True):
         texts.setdefault(level_text(level, replay.record.unit, replay.record.noise.rms), []).append(replay.name)
     said = [f"{listed(files[:MOST_GROUPS_SHOWN])}: {text}" for text, files in texts.items()]
-    return said[:MOST_GROUPS_SHOWN] + (
-        [f"So it is with {len(said) - MOST_GROUPS_SHOWN} more."] if len(said) > MOST_GROUPS_SHOWN else []
-    )
+    left = len(said) - MOST_GROUPS_SHOWN
+    return said[:MOST_GROUPS_SHOWN] + ([f"So it is with {left} more."] if left > 0 else [])
 
 
 def level_text(level: Level, unit: str, noise: float) -> str:

@@ -48,7 +48,7 @@ MOST_KNOWN_FIRST = 3
 # A mean square on held-out records of more times that on the fitted ones than this.
 CARRIES_OVER = 1.5
 # Of more records than this one sentence tells.
-MOST_RECORDS_TOLD = 6
+MOST_REMARKS = 6
 
 
 def identify_document(
@@ -305,7 +305,7 @@ def convergence_remarks(identification: Identification) -> list[str]:
 
 def noise_remarks(identification: Identification) -> list[str]:
     replays = identification.train_replays
-    said = [noise_remark(r) for r in replays if len(replays) <= MOST_RECORDS_TOLD]
+    said = [noise_remark(r) for r in replays if len(replays) <= MOST_REMARKS]
     for output in dict.fromkeys(r.record.output for r in replays if not said):
         of = [r.record for r in replays if r.record.output == output]
         values = [shown(record.noise.rms, record.unit)[0] for record in of]
@@ -322,8 +322,8 @@ def misfit_remarks(identification: Identification) -> list[str]:
              for r, level in pairs if level.from_residual]  # fmt: skip
     if not above:
         return []
-    text = ", ".join(f"{times:.3g} in {file}" for times, file in sorted(above, reverse=True)[:MOST_RECORDS_TOLD])
-    more = f" and {len(above) - MOST_RECORDS_TOLD} signals more" if len(above) > MOST_RECORDS_TOLD else ""
+    text = ", ".join(f"{times:.3g} in {file}" for times, file in sorted(above, reverse=True)[:MOST_REMARKS])
+    more = f" and {len(above) - MOST_REMARKS} signals more" if len(above) > MOST_REMARKS else ""
     why = "the model, in which nothing is free, lacks something."
     if identification.space.free.any():
         why = (

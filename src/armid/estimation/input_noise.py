@@ -115,10 +115,9 @@ def at_rest(record: Record, piece: Piece, values: Array) -> Mask:
     last but one counts, as the drive may begin before this shows.
     """
     outputs = [(piece.of(s.measured), s.is_speed) for s in record.signals]
-    columns = [(values, 0.0, False), *((y, float(np.max(np.abs(y))), is_speed) for y, is_speed in outputs)]
     still = np.zeros(values.size, dtype=np.bool_)
     for way in (slice(None), slice(None, None, -1)):
-        lengths = [*lengths_of_rest([(x[way], size, is_speed) for x, size, is_speed in columns])]
+        lengths = [*lengths_of_rest([values[way]], [(y[way], is_speed) for y, is_speed in outputs])]
         still[way][: lengths[-2] if len(lengths) > 1 else 0] = True
     return still
 
@@ -194,9 +193,9 @@ def answers_to_cosines(
         seen = 0.0
         for k in range(len(numbers)):
             run = replace(ready, record=with_changes(ready.record, name, [w[:, k] for w in scaled])).runs(whole)
-            for column, r, at_rest, size in zip(columns, signals, exact, sizes, strict=True):
+            for column, r, unmoved, size in zip(columns, signals, exact, sizes, strict=True):
                 # a simulation that diverges adds no noise
-                column.append(np.nan_to_num(r.seen(run)[0] - at_rest, posinf=0.0, neginf=0.0))
+                column.append(np.nan_to_num(r.seen(run)[0] - unmoved, posinf=0.0, neginf=0.0))
                 seen = max(seen, float(np.sum(column[-1] ** 2)) / size**2)
         if seen < SMALLEST_SEEN:
             break

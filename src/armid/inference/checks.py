@@ -28,8 +28,8 @@ BANDS_HZ = (0.0, 5.0, 12.0, 25.0, 50.0, 100.0, 250.0, np.inf)
 # Neighbouring ordinates of a tapered periodogram tell partly the same; a band needs so many of the rest.
 INDEPENDENT, FEWEST_ORDINATES = 0.5, 4
 # Frequencies of mains and number of their harmonics. LINE_OF_MAINS: power of a line of a rest over that of its
-# neighbours; BESIDE_LINE: distance of these, in widths 1/T of the rest.
-MAINS_HZ, HARMONICS, LINE_OF_MAINS, BESIDE_LINE = (50.0, 60.0), 5, 4.0, 3.0
+# neighbours; NEXT_TO_LINE: distance of these, in widths 1/T of the rest.
+MAINS_HZ, HARMONICS, LINE_OF_MAINS, NEXT_TO_LINE = (50.0, 60.0), 5, 4.0, 3.0
 # So small a p-value stays significant whatever the number of tests.
 CERTAIN = 1e-7
 # Products of columns whose share of the largest is below this are rounding.
@@ -440,7 +440,7 @@ def mains_hum(seen: Residuals) -> list[tuple[float, float]]:
     rests = [(r.rest - np.mean(r.rest), r.spacing) for r in seen.data.each if r.noise.source == "rest"]
     if not rests:
         return []
-    width = BESIDE_LINE / min(len(x) * step for x, step in rests)
+    width = NEXT_TO_LINE / min(len(x) * step for x, step in rests)
 
     def power(frequency: float) -> float:
         waves = [

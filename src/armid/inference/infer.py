@@ -161,9 +161,8 @@ class Inference:
         which = f" ({', '.join(constants)})" if 0 < len(constants) <= MOST_CONSTANTS else ""
         parts = ["where something unknown acts"] if self.posterior.best_is_unknown else []
         parts += [f"{CONSTANTS_TEXT}{which}"] if constants else [f"size of {sizes[0]}"] if sizes else []
-        beside = ", and ".join(parts) or (
-            CONSTANTS_TEXT if self.exploration.library.tolerances else "starts of the records"
-        )
+        otherwise = CONSTANTS_TEXT if self.exploration.library.tolerances else "starts of the records"
+        beside = ", and ".join(parts) or otherwise
         for name, one in self.of_fit(self.in_force).items():
             if name in self.posterior.parameters:
                 causes = tuple(self.posterior.causes(name, float(of_noise[name]), beside))
@@ -375,10 +374,8 @@ def with_scales(library: Library) -> tuple[Library, Fit]:
         if not own:
             break
         space = fit.records.space
-        wider = {
-            n: (WIDER_RANGE * float(space.low[space.index(n)]), WIDER_RANGE * float(space.high[space.index(n)]))
-            for n in own
-        }
+        ends = {n: (float(space.low[space.index(n)]), float(space.high[space.index(n)])) for n in own}
+        wider = {n: (WIDER_RANGE * low, WIDER_RANGE * high) for n, (low, high) in ends.items()}
         library = replace(library, widened={**library.widened, **wider}, _problems={})
         fit = declared_fit(library)
     return library, fit

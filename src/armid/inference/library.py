@@ -88,6 +88,11 @@ class Library:
         owner, dot, _ = parameter.partition(".")
         return self._by_compiled_name.get(owner) if dot else None
 
+    def public(self, parameter: str) -> str:
+        """Return the name by which a user gives and sees a parameter of a compiled model."""
+        owner = self.owner(parameter)
+        return parameter if owner is None else f"{owner.public}.{parameter.partition('.')[2]}"
+
     @cached_property
     def _by_compiled_name(self) -> dict[str, EffectKey]:
         return {key.compiled: key for key in self.candidates}

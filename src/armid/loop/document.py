@@ -420,15 +420,15 @@ def declared_by(loop: ClosedLoop) -> str:
     if not loop.steps or any(key.name.startswith(ERROR_OF) for key in fit.active):
         return ""
     options = [",".join(f"{s.effect}:{s.form}" if s.form else s.effect for s in loop.steps)]
-    for key in fit.active:
-        for one in library.candidates[key.declared].parameters:
-            name, public = f"{key.compiled}.{one.name}", f"{key.public}.{one.name}"
-            if name in library.fixed_shapes(key) and name in fit.values:
-                options.append(f"--fix {public}={fit.values[name]:.6g}")
-            elif one.null is not None and name in fit.values:
-                null = fit.model.parameters[name].null or 0.0
-                low, high = sorted((null, null + SEARCHED_TO * (fit.values[name] - null)))
-                options.append(f"--bounds {public}={low:.3g}:{high:.3g}")
+    for name, value in fit.values.items():
+        owner, null = library.owner(name), fit.model.parameters[name].null
+        if owner is None:
+            continue
+        if name in library.fixed_shapes(owner):
+            options.append(f"--fix {library.public(name)}={value:.6g}")
+        elif null is not None:
+            low, high = sorted((null, null + SEARCHED_TO * (value - null)))
+            options.append(f"--bounds {library.public(name)}={low:.3g}:{high:.3g}")
     return f"`armid identify` declares this model with `--effects {' '.join(options)}`."
 
 
@@ -559,5 +559,5 @@ def doubt_sentences(judged: Judgement) -> list[str]:
     for e in doubted:
         for why in e.doubts:
             reasons.setdefault(why, []).append(e.name)
-    said = [why if len(names) == len(doubted) else f"{why} ({', '.join(names)})" for why, names in reasons.items()]
-    return [f"Not to be trusted: {', '.join(e.name for e in doubted)}. Why: {'; '.join(said)}."]
+    each = [why if len(names) == len(doubted) else f"{why} ({', '.join(names)})" for why, names in reasons.items()]
+    return [f"Not to be trusted: {', '.join(e.name for e in doubted)}. Why: {'; '.join(each)}."]

@@ -255,7 +255,7 @@ def estimates(
         owner = library.owner(name)
         if name not in library.declared.parameters and owner not in active:
             continue
-        public = name if owner is None else f"{owner.public}.{name.partition('.')[2]}"
+        public = library.public(name)
         if name not in known:
             estimates.append(Estimate(public, value, unit, None, None, (NOT_IDENTIFIED,)))
             continue

@@ -71,7 +71,7 @@ class Campaign(Shown):
 
     def __repr__(self) -> str:
         named = {role: [r.file for r in self.records if r.role == role] for role in ("train", "holdout")}
-        shown = {role: [*files[:MOST_RECORDS_NAMED], *["..."][: len(files[MOST_RECORDS_NAMED:])]]
+        shown = {role: files[:MOST_RECORDS_NAMED] + ["..."] * (len(files) > MOST_RECORDS_NAMED)
                  for role, files in named.items()}  # fmt: skip
         records = "; ".join(f"{len(named[role])} {role}: {', '.join(files)}" for role, files in shown.items())
         return f"<Campaign {self.name} of {self.plant.name} [{self.unit}]; {records}>"

@@ -204,8 +204,7 @@ def noise_of_input(values: Array, outputs: Sequence[tuple[Array, bool]]) -> Inpu
     seen = list[float]()
     if np.unique(values).size < FEWEST_STEPS:
         return InputNoise()
-    rests = [(values, 0.0, False), *((y, float(np.nanmax(np.abs(y))), is_speed) for y, is_speed in outputs)]
-    for n in lengths_of_rest(rests):
+    for n in lengths_of_rest([values], outputs):
         deviations = values[:n] - np.mean(values[:n])
         # of equal values the mean can miss the value by its last digit
         is_equal = np.ptp(values[:n]) == 0.0
@@ -223,11 +222,12 @@ def rounding_of_input(values: Array) -> float:
     return step if np.mean((steps != 0.0) & np.append(True, np.diff(steps) != 0.0)) >= CHANGING else 0.0
 
 
-def lengths_of_rest(columns: Sequence[tuple[Array, float, bool]]) -> Iterator[int]:
-    """Yield growing numbers of first rows in which all columns stand still.
+def lengths_of_rest(inputs: Sequence[Array], outputs: Sequence[tuple[Array, bool]] = ()) -> Iterator[int]:
+    """Yield growing numbers of first rows in which inputs and outputs stand still.
 
-    columns: values, (n_rows,), with the other arguments of `stands_still`.
+    inputs: (n_rows,) each. outputs: columns of the machine's motion, and whether each is a speed.
     """
+    columns = [*((u, 0.0, False) for u in inputs), *((y, float(np.nanmax(np.abs(y))), speed) for y, speed in outputs)]
     n = FEWEST_REST_SAMPLES
     while n <= columns[0][0].size and all(stands_still(x[:n], size, is_speed) for x, size, is_speed in columns):
         yield n

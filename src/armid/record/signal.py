@@ -114,7 +114,7 @@ def rest_and_noise(new: New, inputs: Sequence[Array], is_speed: bool) -> tuple[A
     if new.rest.size >= FEWEST_REST_SAMPLES or not inputs:
         return new.rest, noise
     changes = sum((np.append(0, np.cumsum(np.diff(x) != 0.0)) for x in inputs), np.zeros(inputs[0].size))
-    n_still = max(lengths_of_rest([(x, 0.0, False) for x in inputs]), default=0)
+    n_still = max(lengths_of_rest(inputs), default=0)
     still = ~new.since(changes)[new.n_rest :] | (new.at[new.n_rest :] < n_still)
     rest = rest_between(new.motion, still, is_speed)
     # equal values tell the step of the sensor alone, which the motion tells as well

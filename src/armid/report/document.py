@@ -419,8 +419,8 @@ def may_be_inputs(noise: float, moved: float, left: float | None) -> bool:
 def inputs_act(noise: float, moved: float, left: float | None) -> bool:
     """Tell whether noise of the inputs moves an output by more than its own noise, and shows in what is left, an RMSE.
 
-    Where it does not show, the inputs are exact: their steps are those of a command. Beside much larger errors it does
-    not show either.
+    Where it does not show, the inputs are exact: their steps are those of a command. Next to much larger errors it
+    does not show either.
     """
     if left is None or moved < max(noise, LEAST_OF_LEFT * left):
         return False

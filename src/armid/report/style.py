@@ -243,7 +243,7 @@ def thinned(values: Array, most: int = MOST_VECTOR_POINTS) -> NDArray[np.intp]:
 
 # Where names stand right of the axes, as shares of their width; the distance between two [inch], and the height that
 # an upright panel needs outside its axes [inch].
-BESIDE_AXES, SAMPLE, GAP = 1.045, 0.055, 0.012
+RIGHT_OF_AXES, SAMPLE, GAP = 1.045, 0.055, 0.012
 APART_INCH, FRAME_INCH, LEAST_HEIGHT = 0.235, 1.0, 4.6
 # Identifiers that have a colour of their own in a report.
 MOST_COLOURED = 6
@@ -327,8 +327,8 @@ def draw_intervals(axis: Any, x: Array, y: Array, low: Array, high: Array, k: in
 
 def write_name(axis: Any, name: str, place: float, number: int) -> None:
     style = {"transform": axis.transAxes, "clip_on": False}
-    axis.plot([BESIDE_AXES, BESIDE_AXES + SAMPLE], [place, place], **style, **line_look(number))
-    axis.text(BESIDE_AXES + SAMPLE + GAP, place, name, transform=axis.transAxes, color=INK, va="center", fontsize=10)
+    axis.plot([RIGHT_OF_AXES, RIGHT_OF_AXES + SAMPLE], [place, place], **style, **line_look(number))
+    axis.text(RIGHT_OF_AXES + SAMPLE + GAP, place, name, transform=axis.transAxes, color=INK, va="center", fontsize=10)
 
 
 def name_distance(axis: Any) -> float:
