@@ -18,6 +18,7 @@ from scipy.optimize import minimize
 from scipy.special import logsumexp
 
 from armid.inference.decisions import calibration
+from armid.inference.posterior import UNSEEN
 from calibration.score import read
 from calibration.scores import Closed
 
@@ -58,7 +59,9 @@ class Mixture:
         self.evidence = np.array([m["log_evidence"] for m in models])
         self.prior = np.array([m["log_prior"] for m in models])
         # What tests alone find keeps its prior.
-        self.counts = np.array([[sum(k == kind and n != "output" for k, n in s) for kind in KINDS] for s in sets])
+        self.counts = np.array(
+            [[sum(k == kind and (k, n) not in UNSEEN for k, n in s) for kind in KINDS] for s in sets]
+        )
         unknown = np.array([any(k == "unknown" for k, _ in s) for s in sets])
         self.holds, self.true = [unknown], [float(one.is_unlisted and one.leaves_declared)]
         names = {n for s in sets for n in s if n[0] in ("effect", "record", "drift")}

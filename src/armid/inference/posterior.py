@@ -24,7 +24,7 @@ from armid.model import Array
 # Models of a smaller weight than this, relative to the best, do not count.
 NEGLIGIBLE = float(np.log(1e-6))
 # Something that nobody knows, wherever it acts.
-UNSEEN = frozenset({("unknown", "output")})
+UNSEEN = frozenset({("unknown", "an unknown place")})
 # A smaller p-value leaves no chance that arithmetic could hold.
 SMALLEST_P = 1e-12
 # What further unknowns of a model are, in words.

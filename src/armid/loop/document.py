@@ -16,6 +16,7 @@ from armid.inference.decisions import LISTED, OVER_NOISE, SIGNIFICANCE
 from armid.inference.hypothesis import words
 from armid.inference.infer import Inference, sentence_of
 from armid.inference.missing_signal import Missing
+from armid.inference.posterior import UNSEEN
 from armid.loop.figures import figures_of, record_figure
 from armid.loop.result import (
     CARRIES_NOT,
@@ -359,13 +360,15 @@ def models_of(inference: Inference) -> list[dict[str, Any]]:
     """Return the most probable models with the parameters of the declared model, were each true."""
     entries: dict[str, dict[str, Any]] = {}
     for model, _ in inference.exploration.ranked():
-        probability = inference.posterior.sets.get(frozenset(h.public for h in model), 0.0)
+        own = frozenset(h.public for h in model)
+        # a model counts whether or not something unseen acts as well
+        probability = sum(p for names, p in inference.posterior.sets.items() if names - UNSEEN == own)
         if words(model) not in entries and len(entries) < MOST_DRAWN and (probability >= LISTED or not entries):
-            own = {n: i for n, i in inference.of_fit(model).items() if n in inference.exploration.declared.values}
+            known = {n: i for n, i in inference.of_fit(model).items() if n in inference.exploration.declared.values}
             values = inference.exploration.fits[model].values
             entries[words(model)] = {
                 "model": words(model), "probability": probability,
-                "parameters": {n: {"value": values[n], "low": i.low, "high": i.high} for n, i in own.items()},
+                "parameters": {n: {"value": values[n], "low": i.low, "high": i.high} for n, i in known.items()},
             }  # fmt: skip
     return list(entries.values())
 
