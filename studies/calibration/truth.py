@@ -15,7 +15,7 @@ SAME_PHYSICS = {
     "load_friction": ("load_friction",),
     "backlash": ("backlash",),
     "cogging": ("cogging", "torque_ripple"),
-    "asymmetry": ("asymmetric_viscous", "asymmetric_gain"),
+    "asymmetry": ("asymmetric_viscous", "drive_asymmetry"),
     "offset": ("torque_offset", "gyro_bias", "position_bias", "angle_bias"),
     "drifted_gain": ("drive_gain", "winding_heating", "torque_constant_droop"),
 }

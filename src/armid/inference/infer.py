@@ -276,7 +276,7 @@ def prepared(
     known = {name: (one.mean, one.sd) for name, one in campaign.known.items()}
     library = replace(library, reach=REACH_OF_STRENGTHS, priors=chances, known=known)
     problem = library.problem(())
-    library = library.about(with_fitted_starts(problem.replays, problem.space), library.misfit)
+    library = library.about(with_fitted_starts(problem.replays, problem.space))
     library, declared = with_input_noise(*with_noise(*with_scales(library)))
     return replace(library, doubles=effects.doubles(declared, library)), declared
 

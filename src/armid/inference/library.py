@@ -127,14 +127,15 @@ class Library:
             self._problems[key] = WhiteRecords(replays, space, self.data, self.known)
         return self._problems[key]
 
-    def about(self, replays: Sequence[Replay], misfit: float) -> "Library":
-        """Return the library for what comes next to a fit: its records in motion start where those of the fit do.
+    def about(self, replays: Sequence[Replay]) -> "Library":
+        """Return the library whose records in motion start where others do; itself where no start is fitted."""
+        if not fits_starts(replays):
+            return self
+        data = replace(self.data, records=tuple(ready.record for ready in by_record(replays)))
+        return replace(self, data=data, _problems={})
 
-        misfit: of the fit. Itself where no start is fitted and the misfit is not another.
-        """
-        if fits_starts(replays):
-            data = replace(self.data, records=tuple(ready.record for ready in by_record(replays)))
-            return replace(self, data=data, misfit=misfit, _problems={})
+    def for_misfit(self, misfit: float) -> "Library":
+        """Return the library for what comes next to a fit with such a misfit; itself where that is about its own."""
         return self if 0.5 < misfit / self.misfit < 2.0 else replace(self, misfit=misfit, _problems={})
 
     def with_data(self, data: WhitenedData, as_read: WhitenedData | None = None) -> "Library":

@@ -13,7 +13,7 @@ from armid.estimation.least_squares import WeightedRecords
 from armid.inference.candidates import PROBE, idle
 from armid.inference.checks import variable_names
 from armid.inference.library import Library
-from armid.inference.model import Fit, beyond, candidate_at, free_values
+from armid.inference.model import Fit, beyond, candidate_at, free_values, problem_about
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array, Model
 from armid.problem.problem import Replay, by_record, with_each
@@ -112,7 +112,7 @@ def missing_from(lacking: Fit, library: Library) -> Missing:
 
     Each port costs a simulation for every knot of every piece.
     """
-    segments = segments_about(library.problem(lacking.active, lacking.values), lacking.values, library)
+    segments = segments_about(problem_about(lacking, lacking.active, library), lacking.values, library)
     # Pieces spread evenly over all, as many as the knots allow.
     most = max(1, int(MOST_KNOTS / np.mean([len(s.knots) for s in segments])))
     shown = [segments[i] for i in np.unique(np.linspace(0, len(segments) - 1, min(most, len(segments))).astype(int))]

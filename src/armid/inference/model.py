@@ -245,7 +245,22 @@ def start_of(records: WhiteRecords, values: Mapping[str, float]) -> Array:
 def accurate(fit: Fit, library: Library) -> Fit:
     """Return the fit about its own starts, with finer steps where it ended where the engine's are too coarse."""
     finer = library.recalibrated(fit.active, fit.values, fit.misfit)
-    return with_own_starts(fit if finer is None else fit_from(finer, fit.active, [fit.z]), roughly=True)
+    again = fit if finer is None else fit_from(started_as(finer, fit), fit.active, [fit.z])
+    return with_own_starts(again, roughly=True)
+
+
+def problem_about(fit: Fit, active: Active, library: Library) -> WhiteRecords:
+    """Return the problem with some effects, its records in motion started as those of a fit are."""
+    return started_as(library.problem(active, fit.values), fit)
+
+
+def started_as(problem: WhiteRecords, fit: Fit) -> WhiteRecords:
+    """Return a problem whose records in motion start as those of a fit do, before further unknowns move them."""
+    if not fits_starts(problem.replays):
+        return problem
+    pieces = {r.record.file: r.record.pieces for r in (fit.base or fit.records).replays}
+    return replace(problem, replays=with_each(problem.replays, lambda ours: replace(
+        ours, record=replace(ours.record, pieces=pieces[ours.record.file]))))  # fmt: skip
 
 
 # Shares of their range from which all shapes begin; then each alone from the best of so many places along its range:
@@ -292,7 +307,7 @@ def with_free_shapes(fit: Fit, key: EffectKey, library: Library, problem: WhiteR
     A declared shape that is not the machine's leaves a residual that another effect would be taken for.
     """
     active = freed(fit.active, key)
-    records = library.problem(active, fit.values) if problem is None else problem
+    records = problem_about(fit, active, library) if problem is None else problem
     known = dict(zip(fit.records.space.names, fit.candidate, strict=True))
     z = records.shares(np.array([known[n] for n in records.space.free_names]))
     free = np.array([n in library.fixed_shapes(key) for n in records.space.free_names])

@@ -30,8 +30,10 @@ from armid.inference.kinds import drifts, effects, faults, unknown
 from armid.inference.library import Library
 from armid.inference.model import Fit, finished, fit_from, start_of, unless_diverged, with_free_shapes
 from armid.inference.model import freed as freed_shape
+from armid.inference.shooting import on_short_pieces, on_whole_records
 from armid.inference.unknowns import Unknown, constants_of, freed, polished, projected
 from armid.model import Array
+from armid.problem.starts import fits_starts
 
 Trial = tuple[Hypotheses, Callable[[], Fit | None]]
 # Budgets of computing. Additions that are fitted at each model, those of other kinds, pairs, swaps of each effect.
@@ -64,7 +66,7 @@ class Exploration:
     fits: by the hypotheses that hold in it. forecasts: of each model that was expanded. noise: the scale,
     None: as the model shows it that leaves least. completed: models at their estimates with all unknowns freed, and the
     weight of a square at which they were. refused: models that diverge, are hopeless, or hold a fault that hardly moves
-    its record.
+    its record. in_vain: models that were expanded in turn without a better one, far from the noise.
     """
 
     library: Library
@@ -77,6 +79,7 @@ class Exploration:
     noise: Scale | None = None
     completed: dict[Hypotheses, float] = field(default_factory=dict)
     refused: set[Hypotheses] = field(default_factory=set)
+    in_vain: int = 0
     _evidence: WeakKeyDictionary[Fit, dict[Scale, float]] = field(default_factory=WeakKeyDictionary)
     _scale: WeakKeyDictionary[Fit, Scale] = field(default_factory=WeakKeyDictionary)
 
@@ -132,33 +135,66 @@ def explore(library: Library, declared: Fit, most: int | None = None) -> Explora
 
     declared: its fit. most: models that are expanded, None: as many as the samples allow.
     """
+    exploration = begun(library, declared)
+    expand_all(exploration, 1)
+    if not is_near(exploration):
+        take_from_short_pieces(exploration)
+    if expand_all(exploration, most) and add_unknown(exploration):
+        expand_all(exploration, most)
+    add_unknown(exploration)
+    finish_all(exploration)
+    return exploration
+
+
+def begun(library: Library, declared: Fit) -> Exploration:
+    """Return an exploration that knows the declared model alone."""
     exploration = Exploration(library, effects.hypotheses(library))
     exploration.constants = constants_of(declared.records, declared.z, library.tolerances)
-    cost = len(declared.residual) / SAMPLES * (1.0 + len(exploration.constants) / USUAL_CONSTANTS)
-    most = most or int(np.clip(MOST_EXPANDED / cost, FEWEST_EXPANDED, MOST_EXPANDED))
     exploration.fits[frozenset()] = declared
     exploration.fits[frozenset()] = with_constants(declared, exploration.constants, exploration.scale().weight)
     exploration.faults = faults.hypotheses(declared.records)
     exploration.drifts = drifts.hypotheses(declared, library)
-    in_vain = 0
-    while len(exploration.forecasts) < most and in_vain < MOST_IN_VAIN:
+    return exploration
+
+
+def expand_all(exploration: Exploration, most: int | None) -> bool:
+    """Expand models while one that may be right is not expanded; tell whether none is left.
+
+    most: models that are expanded in all, None: as many as the samples allow.
+    """
+    cost = len(exploration.declared.residual) / SAMPLES * (1.0 + len(exploration.constants) / USUAL_CONSTANTS)
+    most = most or int(np.clip(MOST_EXPANDED / cost, FEWEST_EXPANDED, MOST_EXPANDED))
+    while len(exploration.forecasts) < most and exploration.in_vain < MOST_IN_VAIN:
         model, best = next_model(exploration), exploration.ranked()[0][0]
         if model is None:
-            if not add_unknown(exploration):
-                break
-            continue
+            return True
         complete(exploration, model)
         # Near the noise a second name must not stand for a shape of the first that was held.
         for less in simpler(exploration, model) if is_near(exploration) else []:
-            if has_shapes(exploration, less):
+            if says_little(exploration, less):
                 complete(exploration, less)
         if next_model(exploration) == model:
             expand(exploration, model)
             finish(exploration)
-            in_vain = 0 if exploration.ranked()[0][0] != best or is_near(exploration) else in_vain + 1
-    add_unknown(exploration)
-    finish_all(exploration)
-    return exploration
+            is_better = exploration.ranked()[0][0] != best or is_near(exploration)
+            exploration.in_vain = 0 if is_better else exploration.in_vain + 1
+    return False
+
+
+def take_from_short_pieces(exploration: Exploration) -> None:
+    """Take the models that lead on short pieces of the records, carried on to the whole ones: see `shooting`."""
+    library, constants = exploration.library, exploration.constants
+    begin = on_short_pieces(library, exploration.declared)
+    if begin is None:
+        return
+    library.say("looking at short pieces of the records")
+    short = begun(*begin)
+    expand_all(short, FEWEST_EXPANDED)
+    leaders = [m for m, _ in short.ranked() if m and all(h.kind == "effect" for h in m)][:BEAM]
+    carried = library.each(lambda m: unless_diverged(partial(on_whole_records, short.fits[m], library)), leaders)
+    for model, fit in zip(leaders, carried, strict=True):
+        weight = exploration.scale().weight
+        exploration.take(model, fit and with_constants(fit, constants, weight))
 
 
 def without_denied(exploration: Exploration, denied: Hypotheses, standing: Hypotheses) -> Exploration:
@@ -239,7 +275,7 @@ def with_constants(fit: Fit, constants: Sequence[Unknown], weight: float) -> Fit
 def expand(exploration: Exploration, model: Hypotheses) -> None:
     """Fit the most promising changes of a model: additions of every kind, pairs, swaps, drops, free shapes."""
     fit, library, scale = exploration.fits[model], exploration.library, exploration.scale()
-    library = library.about(fit.records.replays, fit.misfit) if fit.base is None else library
+    library = library.for_misfit(fit.misfit) if fit.base is None else library
     library.say(f"expanding {words(model) if model else 'the declared model'}")
     about, held = expansion_of(fit, scale, library), expansion_of(fit, scale, library, with_doubts=False)
     proposals: list[Proposal] = effects.propose(fit, exploration.known, library)
@@ -503,11 +539,11 @@ def finish_all(exploration: Exploration) -> None:
                 and not is_outdone(m, value, ranked)]  # fmt: skip
         best, top = ranked[0]
         todo += [m for m in simpler(exploration, best)
-                 if not is_complete(exploration, m) and has_shapes(exploration, m)]  # fmt: skip
+                 if not is_complete(exploration, m) and says_little(exploration, m)]  # fmt: skip
         # A name must not stand for its twin, whose rough fit may be far from its estimate.
         twins = [m for m, value in ranked if len(m) == len(best) and len(m - best) == 1 and value > top - HOPELESS]
         todo += [m for m in twins[:N_TWINS]
-                 if m not in todo and not is_complete(exploration, m) and has_shapes(exploration, m)]  # fmt: skip
+                 if m not in todo and not is_complete(exploration, m) and says_little(exploration, m)]  # fmt: skip
         if not todo:
             break
         for model in todo:
@@ -523,9 +559,13 @@ def simpler(exploration: Exploration, model: Hypotheses) -> list[Hypotheses]:
     return sorted(less, key=lambda m: -exploration.log_posterior(m))
 
 
-def has_shapes(exploration: Exploration, model: Hypotheses) -> bool:
-    """Tell whether an effect of a model has a shape that its declaration holds, so that a rough fit says little."""
-    return any(exploration.library.fixed_shapes(key) for key in exploration.fits[model].active)
+def says_little(exploration: Exploration, model: Hypotheses) -> bool:
+    """Tell whether a rough fit of a model says little.
+
+    So it is where an effect has a shape that its declaration holds, or records start as they do in another model.
+    """
+    fit = exploration.fits[model]
+    return fits_starts(fit.records.replays) or any(exploration.library.fixed_shapes(key) for key in fit.active)
 
 
 def is_complete(exploration: Exploration, model: Hypotheses) -> bool:

@@ -23,7 +23,15 @@ from armid.inference.hypothesis import Hypotheses, Hypothesis, words
 from armid.inference.infer import Inference, infer, prepared
 from armid.inference.library import Library, calibrated_replays
 from armid.inference.missing_signal import Missing, missing_from
-from armid.inference.model import Fit, accurate_enough, beyond, candidate_at, decomposed, unless_diverged
+from armid.inference.model import (
+    Fit,
+    accurate_enough,
+    beyond,
+    candidate_at,
+    decomposed,
+    problem_about,
+    unless_diverged,
+)
 from armid.inference.search import without
 from armid.inference.whitening import WhiteRecords
 from armid.loop.result import (
@@ -45,7 +53,6 @@ from armid.loop.result import (
     record_faults_of,
 )
 from armid.model import Array, Effect, Model
-from armid.problem.problem import with_each
 from armid.record import Campaign, Record
 
 # Mistakes of the data checks that leave nothing to search for, and what it tells whatever the loop finds.
@@ -346,12 +353,9 @@ def known_together(fit: Fit, library: Library) -> tuple[str, ...]:
             own[owner.name.removeprefix(ERROR_OF)] = slope(fit, fit.records, name, 1.0 + value)
         else:
             strengths.append(slope(fit, fit.records, name, value))
-    pieces = {r.record.file: r.pieces for r in fit.records.replays}
     for key in library.candidates:
         if key.name.startswith(ERROR_OF) and key not in fit.active:
-            records = library.problem((*fit.active, key), fit.values)
-            there = replace(records, replays=with_each(records.replays, lambda r: replace(
-                r, record=replace(r.record, pieces=pieces[r.record.file]))))  # fmt: skip
+            there = problem_about(fit, (*fit.active, key), library)
             own[key.name.removeprefix(ERROR_OF)] = slope(fit, there, f"{key.compiled}.error", 1.0)
     if not own:
         return tuple(doubles)

@@ -17,6 +17,7 @@ from armid.inference.model import (
     candidate_at,
     fit_from,
     free_values,
+    problem_about,
     responses,
     start_of,
     unless_diverged,
@@ -163,7 +164,7 @@ def strengths(records: WhiteRecords, library: Library) -> dict[EffectKey, list[s
 
 def beside(fit: Fit, active: tuple[EffectKey, ...], library: Library) -> WhiteRecords:
     """Return the problem with other effects on the records as a fit has them: its constants, faults and cover."""
-    problem = library.problem(active, fit.values)
+    problem = problem_about(fit, active, library)
     if fit.records.data.cover is not None:
         problem = replace(problem, data=fit.records.data)
     return moved(problem, [f.unknown for f in fit.others], [f.value for f in fit.others])
@@ -216,7 +217,7 @@ def fitted(
 
 def base_of(fit: Fit, active: tuple[EffectKey, ...], library: Library) -> WhiteRecords | None:
     """Return the problem with other effects before any further unknown of a fit was moved, None where it has none."""
-    return None if fit.base is None else replace(library.problem(active, fit.values), data=fit.base.data)
+    return None if fit.base is None else replace(problem_about(fit, active, library), data=fit.base.data)
 
 
 def first_steps(fit: Fit, about: Expansion, ahead: Forecast, library: Library) -> tuple[float, Array]:

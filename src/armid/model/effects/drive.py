@@ -20,6 +20,27 @@ drive_gain = Effect(
 )  # fmt: skip
 
 
+def difference_of_directions(drive_effort, difference):
+    """Effort on top of the drive's, difference times abs(E).
+
+    The gain is 1 + difference one way and 1 - difference the other way.
+    """
+    return difference * np.abs(drive_effort)
+
+
+def drive_sign(drive_effort):
+    """Effort of the drive, whose gain changes where it is 0."""
+    return drive_effort
+
+
+drive_asymmetry = Effect(
+    name="drive_asymmetry", adds={"drive": difference_of_directions}, guards=(Guard("direction", drive_sign),),
+    parameters=(Parameter("difference", "1", -0.6, 0.6, null=0.0, note="half the difference of the two gains"),),
+    note="the drive is stronger one way than the other",
+    source="Merritt, Hydraulic Control Systems, chapter 6 (cylinders with a rod)",
+)  # fmt: skip
+
+
 def drive_lag_effort(time_constant, lagging, drive_effort):
     """Effort on top of the drive's, z - E, z drives.
 
@@ -84,8 +105,32 @@ def saturation_loss(drive_effort, sharpness):
     return -drive_effort * x / (1 + x)
 
 
+def limit_loss(drive_effort, sharpness):
+    """Effort lost above a hard limit, -E (1 - 1/x) where x = sharpness abs(E) is above 1: the drive gives 1/sharpness.
+
+    Nothing is lost below the limit.
+    """
+    return -drive_effort * (1 - 1 / np.maximum(sharpness * np.abs(drive_effort), 1.0))
+
+
+def to_upper_limit(drive_effort, sharpness):
+    """Effort above the limit, as a share of it."""
+    return sharpness * drive_effort - 1
+
+
+def to_lower_limit(drive_effort, sharpness):
+    """Effort above the limit of the other sign, as a share of it."""
+    return sharpness * drive_effort + 1
+
+
+hard = Effect(
+    name="drive_saturation", form="hard", adds={"drive": limit_loss},
+    guards=(Guard("upper", to_upper_limit), Guard("lower", to_lower_limit)),
+    parameters=(Parameter("sharpness", "1/effort", 0.0, 4.0, null=0.0, note="1/E_s, E_s the most that is given"),),
+    note="the drive gives no more than a limit", source="Tao and Kokotovic 1994, IEEE Trans. Automatic Control 39(1)",
+)  # fmt: skip
 drive_saturation = Effect(
-    name="drive_saturation", adds={"drive": saturation_loss},
+    name="drive_saturation", form="rational", forms=(hard,), adds={"drive": saturation_loss},
     parameters=(Parameter("sharpness", "1/effort", 0.0, 1.0, null=0.0, note="1/E_s, E_s the effort that saturates"),),
     note="the drive gives less per command the more it gives",
     source="Krishnan, Permanent Magnet Synchronous and Brushless DC Motor Drives, doi:10.1201/9781420014235",
@@ -363,7 +408,7 @@ line_loss = Effect(
 )  # fmt: skip
 
 EFFECTS = (
-    drive_gain, drive_lag, drive_delay, drive_saturation, torque_constant_droop, dead_zone, backlash, elastic_drive,
-    coupling_damping, worm_direction, worm_speed, flux_saturation, brush_drop, winding_heating, supply_sag,
-    supply_error, gas_heat_loss, line_loss,
+    drive_gain, drive_asymmetry, drive_lag, drive_delay, drive_saturation, torque_constant_droop, dead_zone, backlash,
+    elastic_drive, coupling_damping, worm_direction, worm_speed, flux_saturation, brush_drop, winding_heating,
+    supply_sag, supply_error, gas_heat_loss, line_loss,
 )  # fmt: skip
