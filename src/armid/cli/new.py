@@ -205,26 +205,27 @@ def record(size: float, frequency: float, seed: int) -> dict[str, Array]:
 # Words of a header, without its unit, that tell what a column is; the first that fits.
 WORDS_OF_HEADERS = {
     "time": ("time", "t", "timestamp", "clock", "tempo", "zeit", "temps"),
-    "speed": ("angular_velocity", "velocity", "speed", "omega", "vel", "w", "rate", "gyro"),
+    "speed": ("angular_velocity", "velocity", "speed", "omega", "vel", "w", "rate", "gyro", "tacho", "tachometer"),
     "position": ("angle", "position", "pos", "theta", "phi", "q"),
     "drive": ("drive", "u", "voltage", "torque", "force", "command", "current", "duty", "pwm", "input", "motor"),
 }
 # End of a unit -> seconds.
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 # Quantity, linear or not -> what its header begins with in a record, the ends of units that it may have, and the one
-# that is taken where the header has none.
+# that is taken where the header has none. A turning machine takes its input in any unit, as `command`.
 HEADERS = {
     ("speed", False): ("angular_velocity", tuple(SUFFIXES["rad/s"]), "rad_s"),
-    ("speed", True): ("velocity", ("m_s",), "m_s"),
+    ("speed", True): ("velocity", tuple(SUFFIXES["m/s"]), "m_s"),
     ("position", False): ("angle", tuple(SUFFIXES["rad"]), "rad"),
-    ("position", True): ("position", ("m",), "m"),
-    ("drive", False): ("drive", ("V", "N_m"), "V"),
-    ("drive", True): ("drive", ("V", "N", "N_m"), "V"),
+    ("position", True): ("position", tuple(SUFFIXES["m"]), "m"),
+    ("drive", False): ("drive", ("V", "N_m", "A"), ""),
+    ("drive", True): ("drive", ("V", "N", "N_m", "A"), "V"),
 }
+COMMAND, CURRENT = "command", "current_A"
 # Units of a drive with a prefix -> end of the unit, and what turns a number into it.
 DRIVEN_IN = {"mV": ("V", 1e-3), "kV": ("V", 1e3), "mA": ("A", 1e-3), "kN": ("N", 1e3), "mN m": ("N_m", 1e-3),
              "mNm": ("N_m", 1e-3), "kNm": ("N_m", 1e3), "kN m": ("N_m", 1e3)}  # fmt: skip
-LINEAR, DRIVES = {"m", "mm", "m_s", "mm_s", "N"}, {"V", "A", "N", "N_m"}
+LINEAR, DRIVES = {*SUFFIXES["m"], *SUFFIXES["m/s"], "N"}, {"V", "A", "N", "N_m"}
 COUNT_ENDS = ("counts", "counts_s")
 TURNING_ENDS = {*SUFFIXES["rad/s"], *SUFFIXES["rad"]}
 # A machine is at rest as long as its signal is nearer to its first rows than so many times their range.
@@ -249,9 +250,11 @@ class Column:
 
 
 def column_of(header: str) -> Column:
-    bracketed = re.fullmatch(r"(.*?)[ _]*[\[(]([^\])]*)[\])]", header)
-    if bracketed:
-        words, unit = bracketed[1].strip().lower().replace(" ", "_"), bracketed[2].strip()
+    apart = re.fullmatch(r"(.*?)[ _]*[\[(]([^\])]*)[\])]", header)
+    if apart is None and header.rpartition(" ")[2] in {*UNIT_ENDS, *DRIVEN_IN}:
+        apart = re.fullmatch(r"(.*) (\S+)", header)
+    if apart:
+        words, unit = apart[1].strip().lower().replace(" ", "_"), apart[2].strip()
         end, factor = DRIVEN_IN.get(unit, (UNIT_ENDS.get(unit, ""), 1.0))
         return Column(header, words, end, "" if end else unit, factor)
     ends = {*UNIT_ENDS.values(), *SECONDS}
@@ -265,9 +268,9 @@ def quantity_of(column: Column) -> str:
     for quantity, words in WORDS_OF_HEADERS.items():
         if any(word == column.words or word in parts for word in words):
             return quantity
-    if column.end in SUFFIXES["rad/s"]:
+    if column.end in {*SUFFIXES["rad/s"], *SUFFIXES["m/s"]}:
         return "speed"
-    return "position" if column.end in {"deg", "rad", "turns"} else ""
+    return "position" if column.end in {"deg", "rad", "turns", *SUFFIXES["m"]} else ""
 
 
 def guessed_campaign(name: str, files: Sequence[Path]) -> tuple[str, dict[str, dict[str, Array]]]:
@@ -291,11 +294,8 @@ def guessed_campaign(name: str, files: Sequence[Path]) -> tuple[str, dict[str, d
         raise ArmidError(f"{tables[0].where}: {straight} tells of a machine that moves straight and {turns[0]} of one "
                          "that turns, which armid has no plant for: a plant of your own by `armid new plant` is "
                          "expected")  # fmt: skip
-    known = ", ".join(unit for unit in (*UNIT_ENDS, *DRIVEN_IN) if " " not in unit)
-    for column in roles.values():
-        if column.unit:
-            where = f"{tables[0].where}: the unit of {quoted(column.header)}"
-            raise ArmidError(f"{where} is not known: one of {known} is expected")
+    for quantity, column in roles.items():
+        check_unit(quantity, column, linear, f"{tables[0].where}: the unit of {quoted(column.header)}")
     notes: list[str] = []
     renamed = {roles[quantity].header: header for quantity, header in new_headers(roles, linear, notes).items()}
     second = seconds_of(roles["time"], tables[0], notes)
@@ -306,6 +306,16 @@ def guessed_campaign(name: str, files: Sequence[Path]) -> tuple[str, dict[str, d
     if any(column_of(h).end in COUNT_ENDS for h in unused):
         notes.append("counts of an encoder are an angle as angle_counts, with counts_per_turn in this file")
     return guessed_text(name, tables, roles, written, renamed, linear, notes), written
+
+
+def check_unit(quantity: str, column: Column, linear: bool, where: str) -> None:
+    """Refuse a unit that is not known or not that of its quantity; the input of a turning machine may have any."""
+    if quantity == "time" or (quantity == "drive" and not linear):
+        return
+    ends = HEADERS[quantity, linear][1]
+    if column.unit or (column.end and column.end not in ends):
+        known = [unit for unit, end in UNIT_ENDS.items() if end in ends and " " not in unit]
+        raise ArmidError(f"{where} is {quoted(column.unit or column.end)}: one of {', '.join(known)} is expected")
 
 
 def roles_of(table: CsvTable) -> dict[str, Column]:
@@ -348,10 +358,8 @@ def new_headers(roles: Mapping[str, Column], linear: bool, notes: list[str]) -> 
             continue
         begin, ends, usual = HEADERS[quantity, linear]
         end = column.end if column.end in ends else usual
-        headers[quantity] = f"{begin}_{end}"
-        guess = "" if end == column.end else f"; GUESS: its unit, which the header does not tell, is {end}"
-        if quantity == "drive" and column.end == "A":
-            headers[quantity], guess = "current_A", ""
+        headers[quantity] = CURRENT if quantity == "drive" and end == "A" else f"{begin}_{end}" if end else COMMAND
+        guess = "" if end in ("", column.end) else f"; GUESS: its unit, which the header does not tell, is {end}"
         times = "" if column.factor == 1.0 else f", its numbers times {column.factor:g}"
         notes.append(f"{headers[quantity]}: the column {quoted(column.header)}{times}{guess}")
     return headers
@@ -435,7 +443,7 @@ def guessed_text(
 def about(columns: Mapping[str, Array], renamed: Mapping[str, str]) -> str:
     """Return rows, rate, rest and sensor of a record in words."""
     times = columns["time_s"]
-    measured = next(h for h in renamed.values() if not h.startswith(("drive_", "current_")))
+    measured = next(h for h in renamed.values() if not h.startswith(("drive_", CURRENT, COMMAND)))
     values = columns[measured]
     present = np.flatnonzero(np.isfinite(values))
     first = values[present[:FEWEST_REST_SAMPLES]]

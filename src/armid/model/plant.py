@@ -182,7 +182,7 @@ class Output:
 # Unit of the one speed that a plant records which declares no outputs -> its name and the columns that bring it.
 SPEEDS = {
     "rad/s": ("angular_velocity", tuple(f"angular_velocity_{end}" for end in SUFFIXES["rad/s"])),
-    "m/s": ("velocity", ("velocity_m_s",)),
+    "m/s": ("velocity", tuple(f"velocity_{end}" for end in SUFFIXES["m/s"])),
 }
 
 

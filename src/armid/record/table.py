@@ -29,9 +29,9 @@ LARGEST_CELL = 1e30
 LONGEST_HEADER = 1 << 16
 TIME_HEADER = "time_s"
 KNOWN_QUANTITIES = ("angular_velocity", "velocity", "time", "drive", "angle", "position")
-FURTHER = ("_rpm", "_turns", "_turns_s", "_counts", "_counts_s")
+FURTHER = ("_rpm", "_turns", "_turns_s", "_counts", "_counts_s", "_m_min")
 # header of a position -> unit of the speed that it belongs to, factor; counts: see `CsvTable.factor`
-POSITIONS = {"position_m": ("m/s", 1.0)}
+POSITIONS = {f"position_{end}": ("m/s", factor) for end, factor in SUFFIXES["m"].items()}
 POSITIONS |= {f"angle_{end}": ("rad/s", factor) for end, factor in SUFFIXES["rad"].items()}
 
 
