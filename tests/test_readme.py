@@ -203,18 +203,6 @@ def test_a_page_of_results_names_only_what_is_there(root):
         assert told == (page.name == "report.md"), page
 
 
-def test_a_page_loses_the_figures_that_are_not_kept(root):
-    clean = runpy.run_path(str(root / "studies" / "make_results.py"))["page"]
-    one, two = (f"### {name}\n\n![{name}]({name}.png)\n\nOf {name}.\n\n" for name in ("one", "two"))
-    text = f"# s\n\nMade from the stored results by `armid report`.\n\n## A\n\n{one}{two}## B\n\n{two}## C\n\nEnd.\n"
-    told = "Made by `python studies/make_results.py s`; figures and the page report.html are then in out/s."
-    assert clean(text, "s", {"one.png"}) == f"# s\n\n{told}\n\n## A\n\n{one}## C\n\nEnd.\n"
-    loop = "# s\n\n| a |\n\n## Figures\n\n![a.png](a.png)\n\n![b.png](b.png)\n"
-    assert clean(loop, "s", {"b.png"}) == f"# s\n\n| a |\n\n## Figures\n\n![b.png](b.png)\n\n{told}\n"
-    assert clean(loop, "s", set()) == f"# s\n\n| a |\n\n{told}\n"
-    assert clean("# s\n\nWords.\n", "s", set()) == f"# s\n\nWords.\n\n{told}\n"
-
-
 def test_the_recipes_name_commands_that_exist(root, recipes):
     chosen = [recipes[name] for name in ("advised", "blind", "table1", "rocking_shell", "emps_identified")]
     for command in (c for recipe in chosen for c in (*(command for _, command in recipe.before), *recipe.commands)):
@@ -256,17 +244,6 @@ def ran(line, capsys):
     errors = [text for text in captured.err.splitlines() if not any(words in text for words in known)]
     assert (left.value.code, errors) == (0, []), line
     return captured.out
-
-
-def test_there_are_five_steps_and_files_of_the_sizes_that_it_promises(tour):
-    headings = re.findall(r"^## \d\. (.*)$", tour, re.MULTILINE)
-    assert len(headings) == len(STEPS)
-    for word, heading in zip(STEPS, headings, strict=True):
-        assert word in heading
-    files = [text for language, text in FENCE.findall(tour) if language == "python"]
-    lines = sorted(len(text.strip().splitlines()) for text in files)
-    assert lines[0] <= lines[1] <= 10
-    assert lines[-1] <= 20
 
 
 @pytest.mark.slow
