@@ -45,7 +45,6 @@ MOST_WORDS = 900
 # Of a number in an output, whose last digits are the processor's, and how near it has to come; speeds are left out.
 NUMBER = re.compile(r"-?\d[\d,]*(?:\.\d+)?(?:e[+-]?\d+)?")
 NEAR, OF_SPEED = 0.01, "simulations/s"
-STEPS = ("Table I", "fitness", "effect", "identifier", "machine")
 
 
 @pytest.fixture(scope="module")
@@ -62,12 +61,6 @@ def blocks(readme):
 @pytest.fixture(scope="module")
 def commands(blocks):
     return [line for language, text in blocks if not language for line in text.splitlines() if line]
-
-
-@pytest.fixture(scope="module")
-def tour(root):
-    """The tour's text, or that of the draft that ARMID_TOUR names."""
-    return (root / os.environ.get("ARMID_TOUR", TOUR)).read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -193,16 +186,6 @@ def test_every_committed_figure_is_shown_and_has_a_recipe(root, recipes):
     assert figures == shown == {path.resolve() for path in made}
 
 
-def test_a_page_of_results_names_only_what_is_there(root):
-    pages = [path for path in committed(root, "results") if path.suffix == ".md" and path != root / RESULTS]
-    assert len(pages) > 10
-    for page in pages:
-        text = page.read_text(encoding="utf-8")
-        assert all((page.parent / name).is_file() for name in IMAGE.findall(text)), page
-        told = text.count(f"Made by `python studies/make_results.py {page.parent.name}`")
-        assert told == (page.name == "report.md"), page
-
-
 def test_the_recipes_name_commands_that_exist(root, recipes):
     chosen = [recipes[name] for name in ("advised", "blind", "table1", "rocking_shell", "emps_identified")]
     for command in (c for recipe in chosen for c in (*(command for _, command in recipe.before), *recipe.commands)):
@@ -270,7 +253,7 @@ def test_every_snippet_runs_and_every_output_is_true(page, root, elsewhere, caps
             lines = [line for line in text.splitlines() if line and not any(part in line for part in LONG)]
             printed = "".join(ran(line, capsys) for line in lines)
             seen["command"] += len(lines)
-    assert min(seen.values()) >= len(STEPS) - 1 or page != TOUR, seen
+    assert min(seen.values()) >= 4 or page != TOUR, seen
     assert min(seen["command"], seen["output"]) >= 1, seen
 
 

@@ -80,15 +80,6 @@ def test_a_report_of_a_real_store(reported):
         assert wanted in page
 
 
-def test_its_numbers_are_those_of_the_store(reported):
-    results = load_study(reported[0])
-    overview = pd.read_csv(reported[0] / "overview.csv").set_index("variant")
-    own = results.parameters.merge(results.runs[["run", "identifier"]], on="run")
-    for (identifier, name), group in own.groupby(["identifier", "parameter"]):
-        assert overview.loc[identifier, f"{name}_mean"] == pytest.approx(group["relative_error"].mean())
-    assert pd.read_csv(reported[0] / "running_time.csv")["n"].tolist() == [2, 2]
-
-
 def test_pages_are_written_and_a_users_analysis_is_a_section(store, run, tmp_path, monkeypatch):
     (tmp_path / "study.sqlite").write_bytes((store / "study.sqlite").read_bytes())
     """A plug-in of another kind may be named as for the study."""

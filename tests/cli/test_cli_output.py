@@ -102,23 +102,6 @@ def test_json_is_one_object_and_quiet_prints_nothing(called, lines):
         assert (ran.code, bool(ran.out)) == (0, line.startswith("list")), line
 
 
-@pytest.mark.slow
-def test_the_answer_comes_first_and_is_that_of_the_page(run, study, small_folder, tmp_path):
-    for i, words in enumerate((("identify", small_folder, *QUICK), ("identifiability", small_folder))):
-        out = tmp_path / str(i)
-        first = run(*words, "--out", out).out.splitlines()[0]
-        assert run("report", out).out.startswith("wrote ")
-        pages = [path.read_text(encoding="utf-8") for path in out.iterdir() if path.suffix in (".md", ".html")]
-        assert len(pages) == 2
-        assert all(first in page for page in pages)
-    ran = run("study", study.parent / "tiny.toml", "--jobs", "1", "--out", study)
-    beaten = "Beaten, but not reproduced by the paper's own method"
-    verdicts = ("Yes, reproduced and beaten", "Reproduced, not beaten", beaten, "No")
-    assert ran.out.splitlines()[0].partition(" (")[0] in verdicts
-    assert run("report", study).out.startswith("wrote ")
-    assert ran.out.splitlines()[0] in (study / "report.md").read_text(encoding="utf-8")
-
-
 def test_a_point_that_takes_too_long_ends_the_check(run, tmp_path):
     (tmp_path / "slow.py").write_text(
         "import time\n\n\ndef slow(measured, simulated):\n    time.sleep(5.0)\n    return simulated[:, 0]\n"

@@ -1,7 +1,6 @@
 """The paper's swarm: its equations, what pymoo expects of it, and pyswarms as an independent second opinion."""
 
 import json
-import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -15,7 +14,7 @@ from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
 from scipy.stats import ks_2samp
 
-from armid.identifiers import IDENTIFIERS, Identifier, as_identifier
+from armid.identifiers import IDENTIFIERS, as_identifier
 from armid.identifiers.pso import PaperPSO
 
 Array = NDArray[np.float64]
@@ -169,20 +168,6 @@ def test_the_catalogue_stretches_the_schedule_over_the_budget() -> None:
 
 def a_small_swarm(budget: int) -> PaperPSO:
     return PaperPSO(n_particles=4, n_iterations=budget // 4)
-
-
-def test_as_identifier() -> None:
-    pso = IDENTIFIERS["pso"]
-    assert as_identifier("other", pso) is pso
-    assert (pso.is_global, pso.uses_gradient, pso.is_stochastic) == (True, False, True)
-    from_class, from_function = as_identifier("a", PaperPSO), as_identifier("b", a_small_swarm)
-    assert isinstance(from_class, Identifier)
-    assert from_class.build(40).budget == 12000
-    from_object = as_identifier("c", a_small_swarm(40))
-    assert from_object.build(1) is not from_object.build(1)
-    for identifier in (pso, from_class, from_function, from_object):
-        assert pickle.loads(pickle.dumps(identifier)).build(40).budget > 0
-    assert from_function.build(40).budget == 40
 
 
 def test_an_algorithm_that_was_used_keeps_its_state_and_is_refused() -> None:

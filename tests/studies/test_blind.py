@@ -11,7 +11,7 @@ import pytest
 
 from armid.record import read_campaign
 from input_texts import SUITE_HEAD
-from stand import RefusalError, families
+from stand import families
 from stand.arm import KNOWN, Arm
 from stand.blind.campaign import SUITE, key_path, main
 from stand.blind.draw import declared_speeds, fit_declared
@@ -169,10 +169,3 @@ REFUSED = [
 def test_refuses_with_one_sentence_and_writes_nothing(refuses: Any) -> None:
     for program, words, sentence in REFUSED:
         refuses(program, words, sentence)
-
-
-def test_a_suite_refuses_an_effect_it_does_not_hold(tmp_path: Path) -> None:
-    file = tmp_path / "suite.toml"
-    file.write_text(SMALL.replace('"none"', '"coulomb"'))
-    with pytest.raises(RefusalError, match="'coulomb', which is none"):
-        cases_of(read_suite(file), 1)

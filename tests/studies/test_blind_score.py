@@ -192,13 +192,3 @@ def test_the_tables_agree_with_the_judgements(suite):
     bias = pd.read_csv(suite / "bias.csv").set_index(["form", "parameter"])
     expected = np.median(np.abs(listed[[f"bias_after_{p}" for p in ("p0", "k", "eta3", "n")]].to_numpy()))
     assert bias.loc[("matching", "all"), "after"] == pytest.approx(expected)
-
-
-@pytest.mark.parametrize(("key", "words"), [("{", "is not JSON"), ("{}", "'campaigns' of"), (None, "cannot be read")])
-def test_a_key_that_is_none_is_refused_with_one_sentence(key, words, tmp_path, capsys):
-    if key is not None:
-        (tmp_path / "key.json").write_text(key)
-    assert score.main([str(tmp_path), "--key", str(tmp_path / "key.json"), "--out", str(tmp_path / "out")]) == 2
-    said = capsys.readouterr().err
-    assert words in said
-    assert said.count("\n") == 1

@@ -1,6 +1,5 @@
 """The measured machines: campaigns of made-up files of their formats, the table, what is refused."""
 
-import importlib.util
 import json
 import re
 import subprocess
@@ -111,13 +110,3 @@ def test_a_line_of_the_table_shows_every_output_of_every_record_held_out(folder,
     assert "| coulomb or stribeck | explained | 12 |" in said
     assert said.count("is not there, left out") == 7
     assert (out / "table.md").read_text().count("\n") == 3
-
-
-@pytest.mark.skipif(importlib.util.find_spec("sysidentpy") is not None, reason="the packages are there")
-@pytest.mark.slow
-def test_baselines_name_the_package_that_is_missing(call, tmp_path):
-    drone_files(tmp_path)
-    call("quarter_drone/make_campaign.py", "--data", tmp_path, "--out", tmp_path / "campaign")
-    code, said = call("baselines.py", tmp_path / "campaign", "--out", tmp_path / "table.md")
-    assert code == 2
-    assert "is missing: pip install pysindy sysidentpy" in said

@@ -6,13 +6,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from stand import RefusalError
 from stand.arm import KNOWN, Arm
 from stand.effects import (
     Effects,
     flux,
     friction,
-    read_effects,
     relative_friction,
     unlisted_torque,
     worm_efficiency,
@@ -135,10 +133,3 @@ def test_what_depends_on_time_depends_on_it_alone() -> None:
     ripple = Effects(slipping_ripple=10.0, slip_hz=1.0)
     expected = 10.0 * math.sin(24.0 * 0.3 + math.pi / 2.0)
     assert unlisted_torque(ARM, ripple, now, 0.0, 0.0) == pytest.approx(expected)
-
-
-@pytest.mark.parametrize("words", [["worm_width=0.1"], ["controller_delay=0.01", "controller_period=0.01"],
-                                   ["cam_bump=10", "cam_width_deg=0"], ["rocking_stop=0.1"]])  # fmt: skip
-def test_refuses_details_that_mean_nothing(words: list[str]) -> None:
-    with pytest.raises(RefusalError):
-        read_effects(words)
