@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from armid.contract.check import check_thing
-from armid.contract.equations import check_effects
 from armid.loop import close_loop
 from armid.model import EFFECTS, Model, Output, is_late_as_a_whole
 from armid.model.effect import zero
@@ -59,27 +58,21 @@ def test_the_plant_keeps_the_contract(plugin):
 def test_a_late_voltage_is_no_late_torque(folder, plugin):
     """Told as one, for want of a port at the winding, it would give another inertia, of which nobody may be sure."""
     boom = load_registry([plugin]).plants["boom"]
-    late = [EFFECTS[name] for name in ("controller_delay", "drive_lag")]
-    points = list(check_effects(late, {"boom": boom}))
-    assert [(name, f.sentence) for name, f in points if not f.passed] == []
-    compiled = {name for name, f in points if f.name == "compiled on boom in rad/s in the form voltage"}
-    assert compiled == {"controller_delay", "drive_lag"}
     ports = {name: unit for name, unit in boom.ports.items() if name != "winding"}
     torque_alone = replace(boom, ports=ports, quantities={**boom.quantities, "winding": zero})
     assert (is_late_as_a_whole(boom), is_late_as_a_whole(torque_alone)) == (False, True)
-    said = [p.sentence for p in check_thing("plants", "boom", torque_alone) if p.name.startswith("late drive")]
-    assert len(said) == 1
-    assert "add a port `winding` [V]" in said[0]
+    said = next(p.sentence for p in check_thing("plants", "boom", torque_alone) if p.name.startswith("late drive"))
+    assert "add a port `winding` [V]" in said
     truth = {"inertia": 0.8, "motor_constant": 1.6, "boom_moment": 4.0, "controller_delay.delay": 0.008}
     model = Model(boom) + EFFECTS["controller_delay"].in_form("voltage")
     space, rng = space_of(model, fixed=truth), np.random.default_rng(7)
-    records, recorded = [], read_campaign(folder / "campaign", {"boom": boom})
-    for replay in replays([*recorded.train[:2], *recorded.holdout[:1]], model, space):
+    records = []
+    for replay in replays(read_campaign(folder / "campaign", {"boom": boom}).records, model, space):
         signal = replay.signal(space.complete(np.empty((1, 0))))[0]
         signal = signal + replay.record.noise.rms * rng.standard_normal(signal.shape)
         records.append(replay.measuring(signal).record)
     campaign = replace(read_campaign(folder / "campaign", {"boom": torque_alone}), records=tuple(records))
-    found = close_loop(Model(torque_alone), campaign, {"controller_delay": EFFECTS["controller_delay"]})
+    found = close_loop(Model(torque_alone), campaign, {n: EFFECTS[n] for n in ("controller_delay", "output_lag")})
     assert [s.effect for s in found.steps] == ["controller_delay"]
     inertia = found.after.estimates[0]
     assert inertia.low < truth["inertia"] < inertia.high
