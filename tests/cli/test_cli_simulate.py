@@ -138,3 +138,8 @@ def test_measured_records_are_not_overwritten(refused, paper_arm_folder, tmp_pat
     before = (folder / "lower.csv").read_bytes()
     assert "is the folder of the campaign" in refused("simulate", folder, "--out", f"{folder}/../campaign")
     assert (folder / "lower.csv").read_bytes() == before
+
+
+def test_a_folder_in_the_place_of_a_file_is_told(refused, paper_arm_folder, tmp_path):
+    (tmp_path / "out" / "lower.csv").mkdir(parents=True)
+    assert "holds a folder lower.csv" in refused("simulate", paper_arm_folder, "--out", tmp_path / "out")
