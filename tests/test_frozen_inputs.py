@@ -16,7 +16,8 @@ from armid.model import EFFECTS, PLANTS
 from armid.registry import load_plugin, load_registry
 
 FROZEN = Path(__file__).parent / "frozen"
-FILES = ("fitness", "identifier", pytest.param("effect", marks=pytest.mark.slow), "plant")
+# Every plant would be compiled with the effect, as tests/contract does.
+FILES = {"fitness": (), "identifier": (), "effect": ("--on", "driven_axis"), "plant": ()}
 
 
 def ran(capsys, *words):
@@ -28,8 +29,8 @@ def ran(capsys, *words):
     return captured.out
 
 
-@pytest.mark.parametrize("kind", FILES)
-def test_starting_files_of_then_and_now_pass_their_contract(kind, capsys, tmp_path, monkeypatch):
+@pytest.mark.parametrize(("kind", "on"), FILES.items())
+def test_starting_files_of_then_and_now_pass_their_contract(kind, on, capsys, tmp_path, monkeypatch):
     """One check where `armid new` still writes the frozen text."""
     monkeypatch.chdir(tmp_path)
     made = ran(capsys, "new", kind, f"my_{kind}", "--out", "mine")
@@ -41,7 +42,7 @@ def test_starting_files_of_then_and_now_pass_their_contract(kind, capsys, tmp_pa
     assert text.count("#") >= 3
     frozen = FROZEN / file.name
     for each in [file] if text == frozen.read_text(encoding="utf-8") else [file, frozen]:
-        told = ran(capsys, "check", f"{each}:my_{kind}")
+        told = ran(capsys, "check", f"{each}:my_{kind}", *on)
         assert re.search(r"^(\d+) of \1 points hold$", told, re.MULTILINE)
 
 

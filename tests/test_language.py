@@ -74,20 +74,11 @@ def is_long(sentence):
 
 
 @pytest.mark.parametrize("paths", [SOURCES, PAGES], ids=["source", "pages"])
-def test_words_that_are_not_used(paths):
-    found = [
-        f"{path.relative_to(ROOT)}:{line}: {match.group(0)}"
-        for path in paths for line, text in texts_of(path) for match in WORDS.finditer(prose(text))
-    ]  # fmt: skip
-    assert not found, "\n".join(found)
-
-
-@pytest.mark.parametrize("paths", [SOURCES, PAGES], ids=["source", "pages"])
-def test_sentences_are_short(paths):
-    found = [
-        f"{path.relative_to(ROOT)}:{line}: {sentence}"
-        for path in paths for line, text in texts_of(path) for sentence in sentences(prose(text)) if is_long(sentence)
-    ]  # fmt: skip
+def test_sentences_are_short_and_of_the_words_that_are_used(paths):
+    found = []
+    for path, (line, text) in ((each, part) for each in paths for part in texts_of(each)):
+        wrong = [m.group(0) for m in WORDS.finditer(prose(text))] + [*filter(is_long, sentences(prose(text)))]
+        found += [f"{path.relative_to(ROOT)}:{line}: {words}" for words in wrong]
     assert not found, "\n".join(found)
 
 

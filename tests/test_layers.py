@@ -1,6 +1,8 @@
 """Layers are one-way, files import each other in no circle, and packages only re-export."""
 
 import ast
+import subprocess
+import sys
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1] / "src" / "armid"
@@ -80,6 +82,25 @@ def test_model_knows_no_numba_and_no_files():
         modules |= {n.module.split(".")[0] for n in nodes if isinstance(n, ast.ImportFrom) and n.module}
         assert not modules & {"numba", "llvmlite", "pathlib", "os", "io", "pandas", "tomllib"}, path
         assert not any(isinstance(n, ast.Call) and getattr(n.func, "id", "") == "open" for n in nodes), path
+
+
+LIGHT = """
+import sys
+import armid
+from armid.cli.main import main
+
+try:
+    main(["--help"])
+except SystemExit:
+    print([name for name in ("numba", "pymoo", "pandas", "matplotlib") if name in sys.modules])
+import armid.problem.fitness
+print([name for name in ("pymoo", "pandas", "matplotlib", "seaborn") if name in sys.modules])
+"""
+
+
+def test_importing_is_light():
+    done = subprocess.run([sys.executable, "-c", LIGHT], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-2:] == ["[]", "[]"]
 
 
 def test_test_stand_shares_no_code_with_the_package():

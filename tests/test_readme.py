@@ -45,7 +45,6 @@ MOST_WORDS = 900
 # Of a number in an output, whose last digits are the processor's, and how near it has to come; speeds are left out.
 NUMBER = re.compile(r"-?\d[\d,]*(?:\.\d+)?(?:e[+-]?\d+)?")
 NEAR, OF_SPEED = 0.01, "simulations/s"
-STEPS = ("Table I", "fitness", "effect", "identifier", "machine")
 
 
 @pytest.fixture(scope="module")
@@ -62,12 +61,6 @@ def blocks(readme):
 @pytest.fixture(scope="module")
 def commands(blocks):
     return [line for language, text in blocks if not language for line in text.splitlines() if line]
-
-
-@pytest.fixture(scope="module")
-def tour(root):
-    """The tour's text, or that of the draft that ARMID_TOUR names."""
-    return (root / os.environ.get("ARMID_TOUR", TOUR)).read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -193,28 +186,6 @@ def test_every_committed_figure_is_shown_and_has_a_recipe(root, recipes):
     assert figures == shown == {path.resolve() for path in made}
 
 
-def test_a_page_of_results_names_only_what_is_there(root):
-    pages = [path for path in committed(root, "results") if path.suffix == ".md" and path != root / RESULTS]
-    assert len(pages) > 10
-    for page in pages:
-        text = page.read_text(encoding="utf-8")
-        assert all((page.parent / name).is_file() for name in IMAGE.findall(text)), page
-        told = text.count(f"Made by `python studies/make_results.py {page.parent.name}`")
-        assert told == (page.name == "report.md"), page
-
-
-def test_a_page_loses_the_figures_that_are_not_kept(root):
-    clean = runpy.run_path(str(root / "studies" / "make_results.py"))["page"]
-    one, two = (f"### {name}\n\n![{name}]({name}.png)\n\nOf {name}.\n\n" for name in ("one", "two"))
-    text = f"# s\n\nMade from the stored results by `armid report`.\n\n## A\n\n{one}{two}## B\n\n{two}## C\n\nEnd.\n"
-    told = "Made by `python studies/make_results.py s`; figures and the page report.html are then in out/s."
-    assert clean(text, "s", {"one.png"}) == f"# s\n\n{told}\n\n## A\n\n{one}## C\n\nEnd.\n"
-    loop = "# s\n\n| a |\n\n## Figures\n\n![a.png](a.png)\n\n![b.png](b.png)\n"
-    assert clean(loop, "s", {"b.png"}) == f"# s\n\n| a |\n\n## Figures\n\n![b.png](b.png)\n\n{told}\n"
-    assert clean(loop, "s", set()) == f"# s\n\n| a |\n\n{told}\n"
-    assert clean("# s\n\nWords.\n", "s", set()) == f"# s\n\nWords.\n\n{told}\n"
-
-
 def test_the_recipes_name_commands_that_exist(root, recipes):
     chosen = [recipes[name] for name in ("advised", "blind", "table1", "rocking_shell", "emps_identified")]
     for command in (c for recipe in chosen for c in (*(command for _, command in recipe.before), *recipe.commands)):
@@ -258,17 +229,6 @@ def ran(line, capsys):
     return captured.out
 
 
-def test_there_are_five_steps_and_files_of_the_sizes_that_it_promises(tour):
-    headings = re.findall(r"^## \d\. (.*)$", tour, re.MULTILINE)
-    assert len(headings) == len(STEPS)
-    for word, heading in zip(STEPS, headings, strict=True):
-        assert word in heading
-    files = [text for language, text in FENCE.findall(tour) if language == "python"]
-    lines = sorted(len(text.strip().splitlines()) for text in files)
-    assert lines[0] <= lines[1] <= 10
-    assert lines[-1] <= 20
-
-
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::armid.record.IrregularSamplingWarning")
 @pytest.mark.parametrize("page", RUN)
@@ -293,7 +253,7 @@ def test_every_snippet_runs_and_every_output_is_true(page, root, elsewhere, caps
             lines = [line for line in text.splitlines() if line and not any(part in line for part in LONG)]
             printed = "".join(ran(line, capsys) for line in lines)
             seen["command"] += len(lines)
-    assert min(seen.values()) >= len(STEPS) - 1 or page != TOUR, seen
+    assert min(seen.values()) >= 4 or page != TOUR, seen
     assert min(seen["command"], seen["output"]) >= 1, seen
 
 

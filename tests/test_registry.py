@@ -14,7 +14,7 @@ from armid.identifiers import Identifier
 from armid.model import Effect, Model, Parameter
 from armid.model.plants.driven_axis import driven_axis
 from armid.problem.fitness import Fitness
-from armid.registry import Registry, load_plugin, load_registry, place_in_plugin
+from armid.registry import Registry, load_plugin, load_registry
 from armid.study.spec import study_registry
 
 LEVEL = (Parameter("c", "effort", 0.0, 0.5, null=0.0),)
@@ -144,15 +144,6 @@ def test_a_file_that_fails_is_refused(tmp_path, text, fragment):
             load_plugin(f"{tmp_path / 'failing.py'}:thing")
         assert fragment in str(refusal.value)
     assert "armid_plugin_failing" not in sys.modules
-
-
-def test_the_place_of_an_error_in_a_plugin(tmp_path):
-    (tmp_path / "late.py").write_text("def failing(measured, simulated):\n    return measured / 'x'\n")
-    function = load_plugin(f"{tmp_path / 'late.py'}:failing")[2]
-    with pytest.raises(TypeError) as late:
-        function(1.0, 2.0)
-    assert place_in_plugin(late.value) == f"{tmp_path / 'late.py'}, line 2"
-    assert place_in_plugin(ValueError("ours")) is None
 
 
 def test_entry_points_of_installed_packages(installed):

@@ -6,6 +6,7 @@ import sqlite3
 import zlib
 from contextlib import closing, suppress
 from pathlib import Path
+from shutil import copytree
 
 import pytest
 
@@ -113,10 +114,8 @@ class Touch:
         return (Path.touch, (Path("touched"),))
 
 
-def test_a_store_with_a_pickle_in_it_runs_nothing(tmp_path, capsys):
-    (tmp_path / "s.toml").write_text(STUDY.format(**GOOD))
-    assert ended("study", "s.toml", "--jobs", "1", "--out", "out") == 0, capsys.readouterr()
-    store = tmp_path / "out" / "study.sqlite"
+def test_a_store_with_a_pickle_in_it_runs_nothing(table_study, tmp_path):
+    store = copytree(table_study / "out", tmp_path / "out") / "study.sqlite"
     written = store.read_bytes()
     for place in ("traces.trace", "runs.error", "study.value"):
         store.write_bytes(written)

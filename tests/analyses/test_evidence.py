@@ -53,18 +53,6 @@ def test_the_papers_swarm_and_the_best_of_the_others_are_of_interest(made):
     assert evidence.best_first == ["pso+bobyqa", "b", "c", "pso, x", "a"]
 
 
-def test_groups_are_the_positions_of_runs_and_failed_runs_count_their_budget(made):
-    evidence = Evidence(made(seeds=2, failed=1))
-    for setting, variants in evidence.groups.items():
-        for variant, rows in variants.items():
-            own = evidence.runs.iloc[rows]
-            assert set(own["setting"]) == {setting}
-            assert set(own["variant"]) == {variant}
-    assert sum(len(rows) for of in evidence.groups.values() for rows in of.values()) == len(evidence.runs)
-    failed = int(np.flatnonzero(evidence.runs["status"] != "done")[0])
-    assert (evidence.used[failed], evidence.n_free[failed]) == (3000.0, 4)
-
-
 def test_an_analysis_of_a_user_gets_the_columns_that_the_docstring_shows(made):
     results = made(seeds=1, failed=1)
     wide, listed = wide_runs(Evidence(results)), str(wide_runs.__doc__).split("=\n")[1]
@@ -101,11 +89,6 @@ def test_first_hits_and_held_values_are_what_a_search_from_the_left_finds(series
     grid = np.array([1, 2, 10, 400, 1000])
     last = [next((v for e, v in reversed(series) if e <= g), np.inf) for g in grid]
     assert held(evaluations, values, grid) == pytest.approx(last)
-
-
-def test_a_target_hit_and_left_again_is_hit_and_an_error_that_is_not_known_hits_nothing():
-    assert first_hits(np.array([1, 5, 9]), np.array([0.5, 0.1, 0.4]), np.array([0.2, 0.01])).tolist() == [5.0, np.inf]
-    assert first_hits(np.array([1, 5]), np.array([np.nan, np.nan]), np.array([1.0])).tolist() == [np.inf]
 
 
 def test_the_tolerances_of_the_success_rates_are_targets():

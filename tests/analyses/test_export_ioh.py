@@ -65,30 +65,10 @@ def test_every_improvement_comes_back_bit_for_bit(exported, loaded):
     assert own[["x0", "x1", "x2", "x3"]].to_numpy().tolist() == trace.X.tolist()
 
 
-def test_its_own_analysis_runs(loaded):
-    from iohinspector.metrics import aggregate_convergence
-
-    curves = aggregate_convergence(loaded.load(monotonic=True, include_meta_data=True), maximization=False)
-    assert set(curves["algorithm_name"]) == {"pso", "cmaes", "de+bobyqa"}
-
-
 def test_a_first_candidate_that_failed_is_logged_as_worst_and_an_early_end_is_logged():
     trace = RunTrace("r", np.array([3]), np.array([0.5]), np.array([[1.0]]), ("k",))
     assert list(lines(trace, 7)) == [f"1 {WORST_VALUE!r} nan\n", "3 0.5 1.0\n", "7 0.5 1.0\n"]
     assert list(lines(trace, 3)) == [f"1 {WORST_VALUE!r} nan\n", "3 0.5 1.0\n"]
-
-
-def test_such_a_run_loads(tmp_path, made):
-    import iohinspector
-
-    results = made(seeds=1, noises=(0.0,), identifiers={"pso": 1e-3})
-    results.kept[0] = results.kept[0]._replace(evaluations=results.kept[0].evaluations + 4)
-    export(results, tmp_path)
-    manager = iohinspector.DataManager()
-    manager.add_folder(str(tmp_path))
-    rows = manager.load(monotonic=False, include_meta_data=True).to_pandas()
-    first = rows[rows["function_name"].str.startswith("row 1")].iloc[0]
-    assert (first["evaluations"], first["raw_y"]) == (1, WORST_VALUE)
 
 
 def test_no_text_of_a_study_file_is_given_to_a_program_that_evaluates_it(exported):

@@ -47,15 +47,9 @@ def long_text():
     return table("Texts", ["what", Column("v", "eta3 [%]", "+.2e")], rows, "Words.", "texts")
 
 
-def test_tables_of_any_width_and_length_fit_the_text(tmp_path):
-    log = log_of([latex(wide()), latex(long_text())], tmp_path)
-    assert "Overfull" not in log
-    assert "Float too large" not in log
-
-
-@pytest.mark.parametrize("report", ["table1", "table2"])
-def test_every_table_of_a_study_fits_the_text(made, tmp_path, report):
-    log = log_of([latex(t) for t in report_of(made(seeds=2, report=report)).tables if t.most], tmp_path)
+def test_tables_of_any_width_and_length_and_those_of_a_study_fit_the_text(made, tmp_path):
+    own = [latex(t) for kind in ("table1", "table2") for t in report_of(made(seeds=2, report=kind)).tables if t.most]
+    log = log_of([latex(wide()), latex(long_text()), *own], tmp_path)
     assert "Overfull" not in log
     assert "Float too large" not in log
 

@@ -5,29 +5,17 @@ import numpy as np
 import pandas as pd
 import pytest
 from made_results import MadeResults
-from matplotlib.collections import PathCollection
-from matplotlib.colors import to_rgba
 
-from armid.report.document import Figure
-from armid.report.style import line_look
 from armid.study.analyses.analysis import Evidence
-from armid.study.analyses.cramer_rao import CRAMER_RAO, LEAST_REALISATIONS
 from armid.study.analyses.errors import (
-    MOST_ERRORS_DRAWN,
     brief,
-    colour_range,
     end_points,
     error_map,
     error_map_figure,
-    signed_powers,
-    thinned,
-    valley_figure,
 )
 from armid.study.analyses.fitness_quality import fitness_quality, fitness_quality_figure
 from armid.study.analyses.overview import loop_runs, main_table, reasons, runs_table
-from armid.study.analyses.success import SUCCESS, success, success_figure, success_rates, wilson
-from armid.study.analyses.table1 import TABLE1
-from armid.study.analyses.table2 import TABLE2
+from armid.study.analyses.success import success, success_rates, wilson
 from armid.study.document import report_of, summary_of
 from armid.units import angles_in
 
@@ -108,45 +96,9 @@ def test_success_rates_show_their_interval_in_percent():
     assert table.frame.loc[0, "within_1_percent_text"] == f"80.0 ({100 * low:.1f} to {100 * high:.1f})"
 
 
-def test_the_figure_of_success_has_the_best_on_top():
-    frame = pd.concat([outcomes_with([1.0, 1e-5]), outcomes_with([1e-6, 1e-6]).assign(variant="de")])
-    figure = success_figure(success_rates(frame), {"pso": 0, "de": 1})
-    assert [t.get_text() for t in figure.axes[0].get_yticklabels()] == ["de", "pso"]
-    plt.close(figure)
-
-
-@pytest.mark.parametrize("report", ["table1", "table2"])
-def test_an_identifier_has_one_colour_in_every_figure(made, report):
-    results = made(seeds=LEAST_REALISATIONS, report=report)
-    results.study["plugins"] = ["mine.py:cmaes"]
-    evidence = Evidence(results)
-    assert next(iter(evidence.colours)) == "cmaes"
-    expected = {v: to_rgba(line_look(i)["color"]) for v, i in evidence.colours.items()}
-    analyses = (SUCCESS, CRAMER_RAO, {"table1": TABLE1, "table2": TABLE2}[report])
-    for figure in (p for a in analyses for p in a.parts(evidence) if isinstance(p, Figure)):
-        drawn = figure.draw()
-        axis, found = drawn.axes[0], {}
-        names = [t.get_text().splitlines()[0] for t in axis.get_yticklabels()]
-        clouds = [m for m in axis.collections if isinstance(m, PathCollection)]
-        marks = [(y, to_rgba(c)) for m in clouds for (_, y), c in zip(m.get_offsets(), m.get_facecolors(), strict=True)]
-        marks += [(np.mean(line.get_ydata()), to_rgba(line.get_color())) for line in axis.lines]
-        for y, colour in marks:
-            found.setdefault(names[min(max(round(y), 0), len(names) - 1)], set()).add(colour)
-        assert all(expected[v] in found[v] for v in expected), figure.name
-        assert not any(expected[v] in found[w] for v in expected for w in expected if v != w), figure.name
-        plt.close(drawn)
-
-
 @pytest.fixture(scope="module")
 def evidence(made):
     return Evidence(made(seeds=2))
-
-
-def test_success_rates_come_in_the_order_of_the_settings_not_as_the_runs_do(made):
-    evidence = Evidence(made(seeds=2))
-    evidence.runs = evidence.runs.iloc[::-1]
-    table, _ = SUCCESS.parts(evidence)
-    assert list(dict.fromkeys(table.frame["setting"])) == evidence.settings
 
 
 def test_the_error_map_has_medians_in_the_orders_given(evidence):
@@ -169,27 +121,6 @@ def test_deviations_in_percent_of_the_valley_and_of_other_machines_first_three_p
     assert ends.iloc[0]["n"] == pytest.approx(100.0 * (first["value"] / first["truth"] - 1.0))
     renamed = evidence.estimates.replace({"parameter": {"p0": "mass", "eta3": "coulomb.level"}})
     assert list(end_points(renamed).columns[2:]) == ["mass", "k", "coulomb.level", "n"]
-
-
-def test_figure_draws_every_run_once_a_pair_and_of_very_many_every_nth(evidence):
-    ends = end_points(evidence.estimates)
-    figure = valley_figure(ends, evidence.colours)
-    pair = next(axis for axis in figure.axes if axis.get_ylabel().startswith("eta3"))
-    assert sum(len(line.get_xdata()) for line in pair.lines) == len(ends)
-    plt.close(figure)
-    many = ends.loc[np.repeat(ends.index, 100)].reset_index()
-    assert thinned(many).groupby("variant").size().max() <= MOST_ERRORS_DRAWN
-
-
-def test_the_colours_of_the_map_span_the_errors_shown():
-    assert colour_range(np.array([0.02, 3.0, np.inf])) == (0.01, 10.0)
-    assert colour_range(np.array([1e-9, 5e3])) == (1e-6, 100.0)
-    assert colour_range(np.array([np.inf])) == (1e-6, 100.0)
-
-
-def test_powers_of_the_valley_have_both_signs_around_0():
-    assert signed_powers(1e-6, 20.0) == [-10.0, -0.001, 0.0, 0.001, 10.0]
-    assert signed_powers(1.0, 0.5) == [-1.0, 0.0, 1.0]
 
 
 def test_a_plug_in_has_the_first_colour_and_every_fitness_a_strip(made):

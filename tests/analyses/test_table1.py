@@ -1,6 +1,5 @@
 """Tables I and II of the paper; the bootstrap interval of a median against its exact distribution."""
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
@@ -9,7 +8,7 @@ from scipy.stats import binom
 
 from armid.study.analyses.analysis import Evidence, published_values
 from armid.study.analyses.table1 import median_interval, percentile_among, table1_rows
-from armid.study.analyses.table2 import spread, table2, table2_figure
+from armid.study.analyses.table2 import spread, table2
 
 PAPERS_MEANS = [0.487, 0.421, 0.171, 0.899]
 
@@ -127,11 +126,3 @@ def test_the_papers_line_comes_first_with_its_own_bound_flagged():
     row = table2(two_records(), published(2.0, 4.0, 9.0)).frame.iloc[0]
     assert (row["variant"], row["mean"], row["n"], row["n_at_bound"]) == ("the paper's pso", 5.0, 3, 1)
     assert row["deviation"] == pytest.approx(np.std([2.0, 4.0, 9.0]))
-
-
-def test_figure_shows_every_run_and_the_paper():
-    runs = two_records()
-    figure = table2_figure(runs, published(2.0, 4.0), dict.fromkeys(runs["variant"], 0))
-    marks = sum(len(line.get_xdata()) for line in figure.axes[0].lines if line.get_ls() == "None")
-    assert marks == 2 + 4
-    plt.close(figure)

@@ -12,12 +12,11 @@ import pytest
 from armid.errors import ArmidError
 from bench import processes
 from bench import run as bench
-from bench.baselines import plain_loop
-from bench.engine import ALLOWED, effects_row, engine_rows, loosest_tolerance, scipy_outputs, threads_row
-from bench.framework import framework_rows, identification, pymoo_framework, sample_replays
+from bench.engine import ALLOWED, effects_row, engine_rows, fitness_rows, threads_row
+from bench.framework import framework_rows
 from bench.measure import Bound, Row, bench_table, fastest
 from bench.processes import grown, memory_rows, peak_memory, scale_rows, startup_row
-from bench.samples import arm_task, child_environment
+from bench.samples import child_environment
 
 ROWS = [
     Row("engine", 3.84, "us", simulations_per_s=260_150.0, error=3.04e-6, note="on one core"),
@@ -30,7 +29,7 @@ ROWS = [
 STAND_IN = (sys.executable, "-c", "import sys; assert sys.argv[1] == 'simulate' and sys.argv[3] == '--out'")
 
 
-def test_the_table_prints_every_row_on_a_line_of_its_own() -> None:
+def test_the_table_prints_every_row_and_says_in_words_what_falls_short() -> None:
     lines = bench_table(ROWS).splitlines()
     for row, line in zip(ROWS, lines[2:], strict=False):
         assert line.startswith(row.what)
@@ -40,9 +39,6 @@ def test_the_table_prints_every_row_on_a_line_of_its_own() -> None:
     assert all(text in lines[3] for text in ("9,756 us", "2,538", "the engine's time", "at least 2,000", "yes"))
     assert "NO" in lines[4]
     assert "not known" in lines[5]
-
-
-def test_the_table_says_in_words_what_falls_short_and_what_else_to_know() -> None:
     text = bench_table(ROWS)
     assert "Falls short: second start has a ratio of 2.9, at most 2.5 is wanted." in text
     assert "engine: on one core." in text
@@ -68,6 +64,11 @@ def test_quick_has_the_same_parts_with_options_that_they_take() -> None:
     assert list(quick) == list(bench.bench_parts())
     for part in quick.values():
         assert part.keywords.keys() <= signature(part.func).parameters.keys()
+
+
+def test_fitnesses_are_measured_for_each_candidate() -> None:
+    whole, numerical = fitness_rows(rounds=1, n_candidates=4)
+    assert whole.measured > numerical.measured > 0
 
 
 def assert_measured(row: Row) -> None:
@@ -103,26 +104,6 @@ def test_threads_give_the_same_bits() -> None:
     assert_measured(row)
     assert row.error <= ALLOWED
     assert "the same bits" in row.note
-
-
-def test_reference_scipy_and_plain_loop_solve_the_same_equations() -> None:
-    task = arm_task(2)
-    reference, plain = task.reference(), np.empty((2, 701))
-    plain_loop(task.population, plain, task.manoeuvre.interval)
-    assert task.error(scipy_outputs(task, 2, 1e-11), reference) < 1e-9
-    assert task.error(plain, reference) < 2e-3
-    tolerance, error = loosest_tolerance(task, reference, 2)
-    assert error <= ALLOWED
-    assert tolerance > 1e-8
-
-
-def test_an_identification_uses_its_whole_budget_and_its_time_is_split() -> None:
-    spent = identification(sample_replays(101), 2)
-    assert spent.used == 160
-    parts = (spent.simulation, spent.fitness, spent.framework)
-    assert all(np.isfinite(p) and p > 0 for p in parts)
-    assert spent.total == pytest.approx(sum(parts))
-    assert pymoo_framework(2) > 0
 
 
 def test_framework_rows() -> None:

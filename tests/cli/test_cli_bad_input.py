@@ -47,14 +47,14 @@ def test_what_is_no_campaign(refused, command, campaign, says):
     assert says in refused(command, campaign, *OUT.get(command, []))
 
 
-def test_refusals(refused, paper_arm_folder, mine):
+def test_refusals(refused, small_folder, mine):
     lines = (Path(__file__).parent / "refusals.txt").read_text(encoding="utf-8").splitlines()
     told = [line for line in lines if line and not line.startswith("#")]
     assert len(told) > 130
     for line in told:
         command, _, fragments = line.partition(" => ")
         words = [word.replace("MINE", str(mine)) for word in shlex.split(command)]
-        sentence = refused(*[paper_arm_folder if word == "ARM" else word for word in words])
+        sentence = refused(*[small_folder if word == "ARM" else word for word in words])
         for fragment in fragments.split(" | "):
             assert fragment in sentence, f"{command}\n{sentence}"
 
@@ -65,17 +65,12 @@ def test_refusals(refused, paper_arm_folder, mine):
     ["identify", "ARM", "--identifier", "multistart:" * 1000 + "bobyqa"], ["report", "n" * 900],
     ["study", "\n" * 900], ["new", "effect", "e" * 900], ["n" * 900],
 ])  # fmt: skip
-def test_a_long_word_makes_no_long_sentence(refused, paper_arm_folder, words):
+def test_a_long_word_makes_no_long_sentence(refused, small_folder, words):
     """What is expected stands at the end, and is kept."""
-    sentence = refused(*[paper_arm_folder if word == "ARM" else word for word in words])
+    sentence = refused(*[small_folder if word == "ARM" else word for word in words])
     assert re.search(r"expected|expects|known|did you mean|--help|too long", sentence[-LONGEST_SENTENCE // 2 :]), (
         sentence
     )
-
-
-def test_truth_values_are_options(run, paper_arm_folder):
-    told = ["--identifier", "pymoo_pso", "--option", "adaptive=false", "--budget", "80", "--window", "0:0.3"]
-    assert run("identify", paper_arm_folder, *told).code == 0
 
 
 def test_memory_that_is_not_there_is_told(refused, monkeypatch):

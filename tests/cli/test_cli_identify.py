@@ -72,48 +72,19 @@ def test_writes_result_and_figures_and_the_same_bits_in_another_process(
     assert printed("--seed", "8").partition("Errors")[0] != text.partition("Errors")[0]
 
 
-def test_fixed_values_and_bounds_and_the_interval_of_the_information(identified, small_folder):
-    from armid.estimation.information import information_at
-    from armid.model import Model
-    from armid.problem.problem import replays
-    from armid.problem.space import space_of
-    from armid.record import read_campaign
-
-    text, result = identified("--fix", "n=1.4", "--fix", "k=1", "--bounds", "p0=3.0e6:3.1e6", "--fitness", "rmse")
+def test_fixed_values_and_bounds(identified):
+    text, result = identified("--fix", "n=1.4", "--fix", "k=1", "--bounds", "p0=3.2e6:3.5e6", "--fitness", "rmse")
     p = result["parameters"]
     assert p["n"].pop("value") == 1.4
     assert p["n"].pop("unit") == "1"
     # a fixed one has neither interval nor bounds
     assert not any(p["n"].values())
-    assert (p["p0"]["bound_low"], p["p0"]["bound_high"]) == (3.0e6, 3.1e6)
-    assert 3.0e6 <= p["p0"]["value"] <= 3.1e6
+    assert (p["p0"]["bound_low"], p["p0"]["bound_high"]) == (3.2e6, 3.5e6)
+    assert p["p0"]["value"] == 3.2e6
+    assert re.search(r"p0 +│ +3\.2 .*AT ITS BOUND", text)
+    assert "p0 sits on its bound" in text
     assert list(result["correlation"]) == ["p0", "eta3"]
     assert re.search(r"n +│ +1\.4 +│ 1 +│ fixed", text)
-    campaign = read_campaign(small_folder).with_window(0.0, 0.4)
-    model = Model(campaign.plant)
-    space = space_of(model, {}, {"p0": (3.0e6, 3.1e6)}, {"n": 1.4, "k": 1.0})
-    x = np.array([p[name]["value"] for name in ("p0", "eta3")])
-    information = information_at(replays(campaign.train, model, space), space, x)
-    assert tuple(information.names) == ("p0", "eta3")
-    assert result["correlation"]["p0"]["eta3"] == pytest.approx(information.correlation[0, 1])
-    for name, half in zip(information.names, information.half_width):
-        assert p[name]["high"] - p[name]["value"] == pytest.approx(half, rel=1e-6)
-        assert p[name]["value"] - p[name]["low"] == pytest.approx(half, rel=1e-6)
-
-
-@pytest.mark.parametrize(("bounds", "at"), [("3.2e6:3.5e6", "3.2"), ("2.6e6:2.9e6", "2.9"), ("2.6e6:3.5e6", None)])
-def test_an_active_bound_is_flagged(printed, bounds, at):
-    text = printed("--bounds", f"p0={bounds}", "--fix", "eta3=0.55", "--fix", "n=1.4", "--fix", "k=1")
-    assert bool(re.search(rf"p0 +│ +{at} .*AT ITS BOUND", text)) == ("AT ITS BOUND" in text) == (at is not None)
-    assert ("p0 sits on its bound" in text) == (at is not None)
-
-
-def test_what_is_not_seen_is_not_determined(identified):
-    text, result = identified("--window", "0:0.3", "--fix", "eta3=0.55", "--fix", "n=1.4", "--fitness", "rmse")
-    assert re.search(r"k +│ +[\d.]+ +│ 1 +│[^│]+│ not determined", text)
-    assert "k is not determined by these records." in text
-    assert (result["parameters"]["k"]["low"], result["parameters"]["k"]["high"]) == (None, None)
-    assert result["correlation"]["p0"]["k"] is None
 
 
 def test_effects_fitness_and_identifier_also_of_a_user_on_an_axis(identified, printed, mine, write_axis, tmp_path):
@@ -135,9 +106,7 @@ def test_effects_fitness_and_identifier_also_of_a_user_on_an_axis(identified, pr
 
 
 @pytest.mark.parametrize(("fitness", "target", "reached"), [
-    ("similarity", 0.9, r"train \(1\) +│ +[\d.]+ │ +[\d.e+]+ │ +([\d.]+)"),
-    ("numerical_similarity", 0.9, r"train \(1\) +│(?: +[\d.e+%]+ │){4} +([\d.]+)"),
-    ("rmse", 0.2, r"train \(1\) +│ +([\d.]+)"),
+    ("similarity", 0.9, r"train \(1\) +│ +[\d.]+ │ +[\d.e+]+ │ +([\d.]+)"), ("rmse", 0.2, r"train \(1\) +│ +([\d.]+)"),
 ])  # fmt: skip
 def test_target_stops_early(printed, fitness, target, reached):
     text = printed("--target", target, "--fitness", fitness, "--budget", "5000")
@@ -172,17 +141,12 @@ def test_an_error_of_ours_is_not_hidden(paper_arm_folder, monkeypatch):
         main(["identify", str(paper_arm_folder)])
 
 
-def test_a_warning_is_one_line(run, small_folder, tmp_path, write_axis):
+def test_a_value_far_outside_its_range_is_told(run, small_folder):
     """3.05 for 3.05e6 is what a forgotten factor of the unit gives."""
-    folder = write_axis(tmp_path / "axis")
-    rows = (folder / "move.csv").read_text().split()
-    (folder / "move.csv").write_text("\n".join(rows[:100] + rows[103:]) + "\n")
     with warnings.catch_warnings():
         warnings.simplefilter("default")
-        uneven = run("identify", folder, "--budget", "80", "--fitness", "similarity")
         outside = run("identify", small_folder, "--fix", "p0=3.05", *QUICK)
-    assert (uneven.code, outside.code) == (0, 0)
-    assert re.fullmatch(r"armid: warning: axis/move\.csv: irregular sampling: .*\n", uneven.err)
+    assert outside.code == 0
     said = "fix p0 = 3.05 is far outside the declared range, 2.6e+06 to 3.5e+06 Pa; it is taken as it is"
     first, second = outside.err.splitlines()
     assert first == f"armid: warning: {said}"
@@ -191,7 +155,7 @@ def test_a_warning_is_one_line(run, small_folder, tmp_path, write_axis):
 
 def test_a_warning_of_several_records_is_told_once(run, tmp_path, write_axis, axis_speed):
     times = np.arange(401) / 200.0
-    others = {f"{name}.csv": axis_speed(times) for name in "abcde"}
+    others = {f"{name}.csv": axis_speed(times) for name in "abc"}
     entries = "".join(f'[[records]]\nfile = "{name}"\nrole = "train"\n' for name in others)
     folder = write_axis(tmp_path / "axis", None, entries, others)
     for name in others:
@@ -202,17 +166,7 @@ def test_a_warning_of_several_records_is_told_once(run, tmp_path, write_axis, ax
         told = run("identify", folder, "--budget", "80").err.splitlines()
     assert len(told) == 1, told
     assert told[0].startswith("armid: warning: axis/a.csv: irregular sampling: ")
-    assert told[0].endswith("; the same with other numbers: b.csv, c.csv, d.csv, e.csv")
-
-
-def test_a_bad_place_is_refused_before_the_search(refused, paper_arm_folder, tmp_path, monkeypatch):
-    def never(*_, **__):
-        raise AssertionError("the search was started")
-
-    monkeypatch.setattr("armid.estimation.identify", never)
-    (tmp_path / "file").write_text("")
-    assert "is a file: a folder is expected" in refused("identify", paper_arm_folder, "--out", tmp_path / "file")
-    assert "Not a directory" in refused("identify", paper_arm_folder, "--out", tmp_path / "file" / "out")
+    assert told[0].endswith("; the same with other numbers: b.csv, c.csv")
 
 
 def test_a_whole_run(run, small_folder, tmp_path):
@@ -253,10 +207,3 @@ def test_at_a_point_and_from_a_result(run, small_folder, tmp_path):
     assert one.out == other.out
     assert "white noise of 0.286 deg/s rms is ASSUMED" in one.out
     assert "1.4 " in one.out
-
-
-def test_fixed_and_bounded(run, small_folder):
-    ran = run("identifiability", small_folder, "--fix", "n=1.4", "--bounds", "p0=3.1e6:3.2e6")
-    assert ran.code == 0
-    assert "\N{BOX DRAWINGS LIGHT VERTICAL} n " not in ran.out
-    assert re.search(r"AT ITS (.*\n.*)?BOUND", ran.out)

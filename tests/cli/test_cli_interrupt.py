@@ -26,10 +26,8 @@ def read_until(terminal, word, seconds=60.0):
 
 
 @pytest.mark.parametrize(
-    ("number", "handler"),
-    [(signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, signal.default_int_handler),
-     (signal.SIGTERM, signal.SIG_IGN)],
-)  # fmt: skip
+    ("number", "handler"), [(signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, signal.SIG_IGN)]
+)
 def test_ctrl_c_and_a_request_to_end_lose_nothing(small_folder, tmp_path, number, handler):
     terminal, theirs = pty.openpty()
     command = [sys.executable, "-m", "armid", "identify", str(small_folder), "--budget", "100000000",
@@ -57,12 +55,18 @@ def test_ctrl_c_and_a_request_to_end_lose_nothing(small_folder, tmp_path, number
     assert f"{result['used']} of 100000000 simulations used, interrupted; seed 1." in text
 
 
-def test_ctrl_c_before_the_first_candidate_is_only_an_end(run, paper_arm_folder, tmp_path, monkeypatch):
-    def interrupted(*_, **__):
-        raise KeyboardInterrupt
+def pressed(*_, **__):
+    raise KeyboardInterrupt
 
+
+def pressed_in_compiled_code(*_, **__):
+    raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+
+
+@pytest.mark.parametrize("interrupted", [pressed, pressed_in_compiled_code])
+def test_ctrl_c_before_the_first_candidate_is_only_an_end(run, small_folder, tmp_path, monkeypatch, interrupted):
     monkeypatch.setattr("armid.problem.problem.fitness_of", interrupted)
-    ran = run("identify", paper_arm_folder, "--budget", "80", "--out", tmp_path / "out")
+    ran = run("identify", small_folder, "--budget", "80", "--out", tmp_path / "out")
     assert (ran.code, ran.out, ran.err.strip()) == (130, "", "armid: interrupted")
     assert not (tmp_path / "out").exists()
 
@@ -163,15 +167,6 @@ def test_an_interrupted_search_returns_its_best(lowering, arm, arm_space, presse
     assert stopped.value == stopped.train.rmse == stopped.trace[1][-1]
     assert stopped.holdout is not None
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-
-
-def test_an_interrupt_out_of_compiled_code_is_one(run, paper_arm_folder, monkeypatch):
-    def wrapped(*_, **__):
-        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
-
-    monkeypatch.setattr("armid.problem.problem.fitness_of", wrapped)
-    ran = run("identify", paper_arm_folder, "--budget", "80")
-    assert (ran.code, ran.err.strip()) == (130, "armid: interrupted")
 
 
 def test_a_search_in_another_thread_leaves_signals_alone(lowering, arm, arm_space):

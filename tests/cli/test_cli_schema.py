@@ -72,17 +72,6 @@ def test_what_the_readers_refuse_the_schema_refuses(file, path, value, root, sch
         (read_campaign if kind_of(file) == "campaign" else read_study)(written)
 
 
-@pytest.mark.parametrize(("file", "wrong", "near"), [
-    (AXIS, "hold", "did you mean 'hold'"), (STUDY, "budget", "did you mean 'budget'"), (LOOPS, "made_by", "'made_by'"),
-])  # fmt: skip
-def test_an_unknown_key_names_the_nearest(file, wrong, near, root, tmp_path):
-    text = (root / file).read_text(encoding="utf-8")
-    written = tmp_path / ("campaign.toml" if kind_of(file) == "campaign" else "study.toml")
-    written.write_text(f"{wrong}s = 1\n{text}", encoding="utf-8")
-    with pytest.raises(ArmidError, match=near):
-        (read_campaign if kind_of(file) == "campaign" else read_study)(written)
-
-
 def test_every_key_has_a_meaning_of_one_sentence_and_its_kind_in_words():
     for sheet in SHEETS:
         for f in (f for f in fields(sheet) if f.metadata):

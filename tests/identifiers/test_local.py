@@ -8,7 +8,7 @@ import pytest
 from numpy.typing import NDArray
 from searches import Bowl, identifier, ran
 
-from armid.identifiers.local import ALGORITHMS, CENTRAL, FORWARD, optimised, slopes, stencil
+from armid.identifiers.local import ALGORITHMS, CENTRAL, optimised, slopes, stencil
 from armid.identifiers.search import Calls
 
 Array = NDArray[np.float64]
@@ -58,16 +58,6 @@ def test_the_first_step_is_the_one_that_was_asked_for(name: str) -> None:
         assert np.abs(second - first).max() == pytest.approx(step, rel=1e-9)
 
 
-def test_a_seed_moves_the_start_and_nothing_else_does() -> None:
-    def start(seed: int) -> Array:
-        problem = Bowl()
-        ran("bobyqa", problem, 1, seed=seed)
-        return problem.batches[0][0]
-
-    np.testing.assert_array_equal(start(3), start(3))
-    assert not np.array_equal(start(3), start(4))
-
-
 @pytest.mark.parametrize("name", [*FREE, "lbfgs", "slsqp", "least_squares"])
 def test_a_start_without_fitness_is_drawn_again(name: str) -> None:
     problem = Bowl(fail_above=0.1)
@@ -102,31 +92,6 @@ def test_central_differences_are_exact_for_parabolas_also_at_bounds(u: tuple[flo
     assert (np.count_nonzero(beside.points != here, axis=1) == 1).all()
     found = slopes(beside, quadratic(here[np.newaxis])[0], quadratic(beside.points))
     np.testing.assert_allclose(found, gradient(here), atol=1e-9)
-
-
-def test_forward_differences_are_exact_for_lines_and_turn_inwards() -> None:
-    here = np.array([1.0, 0.2, 0.9995])
-    beside = stencil(here, 1e-3, FORWARD)
-    np.testing.assert_allclose(beside.offsets, [-1e-3, 1e-3, -1e-3])
-    lines = np.array([[1.0, -2.0, 3.0], [0.5, 0.0, 7.0]])
-    found = slopes(beside, lines @ here, beside.points @ lines.T)
-    np.testing.assert_allclose(found, lines.T, atol=1e-9)
-
-
-def test_failed_neighbours_leave_the_other_side_or_nothing() -> None:
-    here = np.array([0.3, 0.6, 0.5])
-    beside = stencil(here, 1e-4, CENTRAL)
-    values = quadratic(beside.points)
-    values[0], values[1], values[4] = np.nan, np.inf, np.nan
-    found = slopes(beside, quadratic(here[np.newaxis])[0], values)
-    expected = gradient(here)
-    np.testing.assert_allclose(found[0], expected[0], atol=2e-4)
-    np.testing.assert_array_equal(found[1], 0.0)
-    np.testing.assert_allclose(found[2], expected[2], atol=1e-8)
-    forward = stencil(here, 1e-4, FORWARD)
-    values = quadratic(forward.points)
-    values[2] = np.nan
-    np.testing.assert_array_equal(slopes(forward, quadratic(here[np.newaxis])[0], values)[2], 0.0)
 
 
 @pytest.mark.parametrize(("kind", "size"), [("forward", 3), ("central", 6)])

@@ -1,7 +1,6 @@
 """The paper's swarm: its equations, what pymoo expects of it, and pyswarms as an independent second opinion."""
 
 import json
-import pickle
 import subprocess
 import sys
 from pathlib import Path
@@ -10,15 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from pymoo.core.algorithm import Algorithm
-from pymoo.core.callback import Callback
 from pymoo.core.evaluator import Evaluator
 from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
-from pymoo.util.display.single import SingleObjectiveOutput
 from scipy.stats import ks_2samp
 
-from armid.identifiers import IDENTIFIERS, Identifier, as_identifier
+from armid.identifiers import IDENTIFIERS, as_identifier
 from armid.identifiers.pso import PaperPSO
 
 Array = NDArray[np.float64]
@@ -67,36 +63,14 @@ def literal_swarm(seed: int, n_particles: int, n_iterations: int, limit: Array) 
     return np.array(visited), np.array(bests)
 
 
-class Bests(Callback):  # type: ignore[misc]
-    """Keep the best of each generation and what else a callback may look at."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.bests: list[float] = []
-        self.rows: list[tuple[int, int, int]] = []
-        self.pops: list[Any] = []
-
-    def notify(self, algorithm: Algorithm) -> None:
-        self.bests.append(float(algorithm.opt[0].F[0]))
-        self.rows.append((algorithm.n_gen, algorithm.evaluator.n_eval, len(algorithm.pop)))
-        self.pops.append((algorithm.pop, algorithm.pop.get("F").copy()))
-
-
 @pytest.mark.parametrize(("limit", "fraction"), [("literal", 0.5), (0.1, 0.1)])
 def test_moves_as_the_equations_say(limit: str | float, fraction: float) -> None:
-    problem, bests = Valley(), Bests()
+    problem, bests = Valley(), []
     swarm = PaperPSO(n_particles=13, n_iterations=40, velocity_limit=limit)
-    minimize(problem, swarm, seed=3, callback=bests)
+    minimize(problem, swarm, seed=3, callback=lambda algorithm: bests.append(float(algorithm.opt[0].F[0])))
     visited, literal = literal_swarm(3, 13, 40, np.full(4, fraction * 4.0))
     np.testing.assert_array_equal(np.array(problem.seen), visited)
-    np.testing.assert_array_equal(bests.bests, literal)
-
-
-def test_golden_run() -> None:
-    result = minimize(Valley(), PaperPSO(n_particles=8, n_iterations=12), seed=1)
-    golden = [-0.6260962430294871, 0.7016724509797485, 0.5964150869848239, 0.700896466192912]
-    np.testing.assert_allclose(result.X, golden, rtol=1e-9)
-    np.testing.assert_allclose(result.F[0], 25.48436622399027, rtol=1e-9)
+    np.testing.assert_array_equal(bests, literal)
 
 
 def test_the_paper_s_settings_make_12000_evaluations() -> None:
@@ -116,31 +90,6 @@ def test_every_evaluator_gives_the_same_run() -> None:
     for other in (plain, given):
         np.testing.assert_array_equal(other.pop.get("X"), light.pop.get("X"))
         assert other.algorithm.evaluator.n_eval == light.algorithm.evaluator.n_eval == 12000
-
-
-def test_what_pymoo_shows_of_a_run_is_true() -> None:
-    bests = Bests()
-    result = minimize(Valley(), PaperPSO(), ("n_gen", 6), seed=2, callback=bests, save_history=True)
-    assert bests.rows == [(n, 80 * n, 80) for n in range(1, 7)]
-    for pop, f in bests.pops:
-        np.testing.assert_array_equal(pop.get("F"), f)
-    assert [len(h.problem.seen) for h in result.history] == [1, 2, 3, 4, 5, 6]
-    assert [float(h.opt[0].F[0]) for h in result.history] == bests.bests
-    x, f, cv, feas, n_gen = result.pop.get("X", "F", "CV", "FEAS", "n_gen")
-    np.testing.assert_array_equal(valley(x), f[:, 0])
-    assert (cv == 0.0).all()
-    assert feas.all()
-    assert set(n_gen) <= {1, 2, 3, 4, 5, 6}
-    assert f.min() >= result.F[0] == result.opt[0].F[0] == min(bests.bests)
-    assert result.CV[0] == 0.0
-    assert all(individual.evaluated >= {"F", "G", "H"} for individual in result.pop)
-
-
-def test_prints_with_an_output(capsys: pytest.CaptureFixture[str]) -> None:
-    minimize(Valley(), PaperPSO(output=SingleObjectiveOutput()), ("n_gen", 3), seed=1, verbose=True)
-    lines = capsys.readouterr().out.splitlines()
-    assert "f_min" in lines[1]
-    assert lines[-1].split("|")[1].strip() == "240"
 
 
 def test_values_of_the_problem_beside_the_fitness_reach_the_individuals() -> None:
@@ -176,7 +125,7 @@ def valley(x):
     return sum(100.0 * (v - u * u) ** 2 + (1.0 - u) ** 2 for u, v in ((a, b), (b, c), (c, d)))
 
 low, high, errors = np.full(4, -2.0), np.full(4, 2.0), []
-for seed in range(60):
+for seed in range(40):
     np.random.seed(seed)
     swarm = GlobalBestPSO(80, 4, {"c1": 1.2, "c2": 1.7, "w": 0.9}, (low, high), {"w": "lin_variation"}, "nearest",
                           (low, high))
@@ -193,9 +142,9 @@ def test_pyswarms_finds_as_much(tmp_path: Path) -> None:
     # in a process and a folder of its own: pyswarms draws from the global generator, reconfigures logging, writes a log
     # file; its first iteration counts as 0 and its first velocities fill the limit, so both are matched to ours there
     theirs = subprocess.run([sys.executable, "-c", PYSWARMS], cwd=tmp_path, capture_output=True, text=True, check=True)
-    ours = [minimize(Valley(), PaperPSO(), seed=seed).F[0] for seed in range(60)]
+    ours = [minimize(Valley(), PaperPSO(), seed=seed).F[0] for seed in range(40)]
     a, b = np.log10(ours), np.log10(json.loads(theirs.stdout))
-    assert len(b) == 60
+    assert len(b) == 40
     assert ks_2samp(a, b).pvalue > 0.01
     assert abs(np.median(a) - np.median(b)) < 0.5
 
@@ -219,20 +168,6 @@ def test_the_catalogue_stretches_the_schedule_over_the_budget() -> None:
 
 def a_small_swarm(budget: int) -> PaperPSO:
     return PaperPSO(n_particles=4, n_iterations=budget // 4)
-
-
-def test_as_identifier() -> None:
-    pso = IDENTIFIERS["pso"]
-    assert as_identifier("other", pso) is pso
-    assert (pso.is_global, pso.uses_gradient, pso.is_stochastic) == (True, False, True)
-    from_class, from_function = as_identifier("a", PaperPSO), as_identifier("b", a_small_swarm)
-    assert isinstance(from_class, Identifier)
-    assert from_class.build(40).budget == 12000
-    from_object = as_identifier("c", a_small_swarm(40))
-    assert from_object.build(1) is not from_object.build(1)
-    for identifier in (pso, from_class, from_function, from_object):
-        assert pickle.loads(pickle.dumps(identifier)).build(40).budget > 0
-    assert from_function.build(40).budget == 40
 
 
 def test_an_algorithm_that_was_used_keeps_its_state_and_is_refused() -> None:

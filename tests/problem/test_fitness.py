@@ -1,6 +1,5 @@
 """Fitnesses: what they are bound to, how records join, and that no NaN leaves."""
 
-import subprocess
 import sys
 from functools import partial
 from typing import Any
@@ -15,12 +14,10 @@ from armid.problem.fitness import (  # fmt: skip
     Fitness,
     as_fitness,
     chi_square,
-    dissimilarity,
     joined,
     record_weights,
     relative_mean_square,
 )
-from armid.problem.similarity import similarity
 
 Array = NDArray[np.float64]
 OF_RECORD = {"interval": 0.001, "noise": 0.2}
@@ -31,12 +28,6 @@ def records() -> list[tuple[Array, Array]]:
     rng = np.random.default_rng(1)
     series = [np.sin(np.linspace(0.0, turns, n)) * size for n, turns, size in ((401, 7.0, 1.0), (150, 4.0, 9.0))]
     return [(x, x + 0.1 * np.abs(x).max() * rng.standard_normal((5, x.size))) for x in series]
-
-
-def test_thresholds_of_the_similarity_are_options() -> None:
-    x, rows = records()[0]
-    loose = Fitness("loose", partial(dissimilarity, slope_threshold=50.0))
-    np.testing.assert_array_equal(loose(x, rows, 0.001), 1.0 - similarity(x, rows, 0.001, slope_threshold=50.0)[0])
 
 
 def test_a_plain_function_becomes_a_fitness() -> None:
@@ -152,13 +143,6 @@ def test_warped_time_names_the_package_that_it_needs(monkeypatch: pytest.MonkeyP
     monkeypatch.setitem(sys.modules, "dtaidistance.dtw", None)
     with pytest.raises(ValueError, match="needs the package dtaidistance, which is not installed"):
         FITNESS["dtw"](*noisy(), interval=0.001)
-
-
-def test_importing_is_light() -> None:
-    heavy = ("pymoo", "matplotlib", "seaborn", "pydantic", "pandas")
-    script = f"import sys, armid.problem.fitness; print([m for m in {heavy!r} if m in sys.modules])"
-    result = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
-    assert result.stdout.strip() == "[]"
 
 
 def test_refuses_noise_that_is_none_and_a_zero_measurement_to_divide_by() -> None:

@@ -10,7 +10,7 @@ from pymoo.core.problem import Problem
 
 import armid
 from armid.errors import ArmidError
-from armid.problem.suite import CLASSES_OF_FORMS, DEFINITIONS, line_across, n_minima
+from armid.problem.suite import CLASSES_OF_FORMS, DEFINITIONS
 
 # Values of version 1 at a point each: u_j = frac(i sqrt(j + 2)), i from 1 in this order.
 STORED = {
@@ -137,10 +137,3 @@ def test_a_campaign_is_a_problem_on_top(paper_arm, paper_arm_folder):
     assert records(u).shape == (2, len(paper_arm.train))
     with pytest.raises(ArmidError, match="campaign 'paper_arm': the suite has a problem of that name already"):
         armid.suite(campaigns=[paper_arm, paper_arm_folder])
-
-
-def test_minima_on_a_line():
-    for values, n in (((3, 2, 1, 2, 3), 1), ((1, 2, 3), 1), ((1, 2, 1), 2), ((2, 1, 1, 2, 0), 2), ((1, 1), 1)):
-        assert n_minima(np.array(values, dtype=float)) == n
-    line = line_across(np.array([0.5, 0.25]), np.array([1.0, 1.0]))
-    np.testing.assert_allclose(line[[0, -1]], [[0.25, 0.0], [1.0, 0.75]], atol=1e-12)

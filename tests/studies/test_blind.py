@@ -11,7 +11,7 @@ import pytest
 
 from armid.record import read_campaign
 from input_texts import SUITE_HEAD
-from stand import RefusalError, families
+from stand import families
 from stand.arm import KNOWN, Arm
 from stand.blind.campaign import SUITE, key_path, main
 from stand.blind.draw import declared_speeds, fit_declared
@@ -71,20 +71,6 @@ def test_the_suite_holds_what_the_question_asks() -> None:
         assert Counter(case.coloured for case in cases if case.label == label)[True] * 2 == counts[label]
 
 
-def test_two_effects_are_of_two_ports() -> None:
-    for case in cases_of(read_suite(SUITE), 1):
-        if case.label == "two":
-            assert len({each.kind.port for each in case.planted}) == 2
-
-
-def test_the_sizes_of_an_effect_grow() -> None:
-    """Take the first number that differs; for a saturation, a time constant or a frequency less is more."""
-    for kind in read_suite(SUITE).effects:
-        changing = next((n for n in kind.sizes[0] if kind.sizes[0][n] != kind.sizes[-1][n]), None)
-        values = [size[changing] for size in kind.sizes] if changing else []
-        assert values in (sorted(values), sorted(values, reverse=True))
-
-
 def test_campaigns_of_a_part_are_those_of_the_whole() -> None:
     cases = cases_of(read_suite(SUITE), 1)
     part = shuffled(cases, 1, ["coulomb"])
@@ -103,18 +89,10 @@ def test_a_suite_is_the_same_from_one_process_or_two(small: Path, tmp_path: Path
     assert key_path(again).read_bytes() == key_path(small).read_bytes()
 
 
-def test_the_key_lies_beside_the_campaigns_and_not_among_them(small: Path) -> None:
-    assert sorted(each.name for each in small.parent.iterdir()) == ["small.toml", "suite", "suite.key.json"]
-    assert (
-        sorted(each.name for each in small.iterdir())
-        == ["c000", "c001", "c002", "c003"]
-        == sorted(key_of(small)["campaigns"])
-    )
-    assert {each.suffix for each in small.rglob("*") if each.is_file()} == {".toml", ".md", ".csv"}
-
-
 def test_a_campaign_tells_nothing_of_its_truth(small: Path) -> None:
     words = re.compile(r"effect|seed|true|noise|colou?r|white|p0|eta3|bias|class|index|key", re.IGNORECASE)
+    assert sorted(each.name for each in small.iterdir()) == sorted(key_of(small)["campaigns"])
+    assert {each.suffix for each in small.rglob("*") if each.is_file()} == {".toml", ".md", ".csv"}
     for campaign in small.iterdir():
         for name in ("campaign.toml", "README.md"):
             text = (campaign / name).read_text().replace("shell = true", "")
@@ -180,30 +158,14 @@ def test_the_fit_finds_an_arm_that_lacks_nothing() -> None:
 
 
 REFUSED = [
-    (main, ["suite"], "--seed"),
-    (main, ["suite", "--seed", "-1"], "seed must be 0"),
     (main, ["suite", "--seed", "1", "--only", "cool"], "no class or effect 'cool'"),
-    (main, ["suite", "--seed", "1", "--processes", "0"], "processes must be 1"),
-    (main, ["suite", "--seed", "1", "--suite", "none.toml"], "cannot be read"),
     (main, ["suite", "--seed", "1", "--suite", "empty.toml"], "lacks the key 'suite'"),
     (main, ["suite", "--seed", "1", "--suite", "wrong.toml"], "describes no suite"),
-    (main, ["file", "--seed", "1"], "is a file"),
-    (main, ["full", "--seed", "1"], "give --force"),
     (main, ["full", "--seed", "1", "--force"], "holds mine.txt"),
     (families.main, ["made", "falt=1", "--seed", "1"], "families: 'falt=1' is not a FAMILY=N: one of control, fault"),
-    (families.main, ["made", "fault=x", "--seed", "1"], "'fault=x' is not a FAMILY=N"),
-    (families.main, ["made", "fault=1", "--seed", "-1"], "seed must be 0"),
-    (families.main, ["made", "fault=1", "--seed", "1", "--suite", "none.toml"], "none.toml cannot be read"),
 ]
 
 
 def test_refuses_with_one_sentence_and_writes_nothing(refuses: Any) -> None:
     for program, words, sentence in REFUSED:
         refuses(program, words, sentence)
-
-
-def test_a_suite_refuses_an_effect_it_does_not_hold(tmp_path: Path) -> None:
-    file = tmp_path / "suite.toml"
-    file.write_text(SMALL.replace('"none"', '"coulomb"'))
-    with pytest.raises(RefusalError, match="'coulomb', which is none"):
-        cases_of(read_suite(file), 1)

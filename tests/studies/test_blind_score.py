@@ -8,8 +8,6 @@ import pytest
 from made_up import made_entry, made_report
 
 from blind import advice, families, score, tables
-from blind.figures import advice_figure
-from stand import RefusalError
 from stand.score.judge import Claim
 
 PAIR = ["coulomb", "brush_drop"]
@@ -72,13 +70,6 @@ def test_rates_and_the_test_of_pairs():
     assert aims["all pairs: lead over a random record"].met
 
 
-def test_no_lead_is_no_lead():
-    _, aims = judged_pairs([1, 0], [0, 1])
-    lead = aims["all pairs: lead over a random record"]
-    assert (lead.found, lead.met) == (0.0, False)
-    assert judged_pairs([1], [1])[0][0]["p"] == 1.0
-
-
 def test_a_campaign_that_was_closed_for_one_choice_alone_does_not_count(tmp_path):
     key, reports = made([1, 1, 1], [0, 0, 0])
     del reports["a02_random"]
@@ -88,28 +79,6 @@ def test_a_campaign_that_was_closed_for_one_choice_alone_does_not_count(tmp_path
     assert rates.frame["n"].tolist() == [2, 2]
     assert len(campaigns.frame) == 6
     assert (tmp_path / "advice.png").stat().st_size > 5_000
-
-
-def test_a_key_of_other_campaigns_is_refused():
-    key, reports = made([1], [1])
-    del key["a00_random"]["choice"]
-    with pytest.raises(RefusalError, match="does not tell of campaign 'a00_random' who chose"):
-        advice.separations(key, reports)
-
-
-def test_the_figure_shows_each_pair_with_both_records():
-    found = pd.DataFrame({
-        "pair": ["viscous / quadratic_drag", "winding_heating / worm_direction"], "n": [20, 18],
-        "advised": [0.9, 1.0], "advised_low": [0.7, 0.84], "advised_high": [0.97, 1.0],
-        "random": [0.7, 0.5], "random_low": [0.48, 0.3], "random_high": [0.85, 0.7],
-    })  # fmt: skip
-    figure = advice_figure(found, 0.8)
-    (axis,) = figure.axes
-    labels = ["viscous / quadratic_drag (20)", "winding_heating / worm_direction (18)"]
-    assert [t.get_text() for t in axis.get_yticklabels()] == labels
-    drawn = [container.lines[0].get_xdata() for container in axis.containers]
-    assert np.allclose(drawn, [[90.0, 100.0], [70.0, 50.0]])
-    assert [t.get_text() for t in figure.legends[0].get_texts()] == ["target 80 %", "advised record", "random record"]
 
 
 def family(name, truths=(), fault=None, constants=None, dirt="none"):
@@ -223,13 +192,3 @@ def test_the_tables_agree_with_the_judgements(suite):
     bias = pd.read_csv(suite / "bias.csv").set_index(["form", "parameter"])
     expected = np.median(np.abs(listed[[f"bias_after_{p}" for p in ("p0", "k", "eta3", "n")]].to_numpy()))
     assert bias.loc[("matching", "all"), "after"] == pytest.approx(expected)
-
-
-@pytest.mark.parametrize(("key", "words"), [("{", "is not JSON"), ("{}", "'campaigns' of"), (None, "cannot be read")])
-def test_a_key_that_is_none_is_refused_with_one_sentence(key, words, tmp_path, capsys):
-    if key is not None:
-        (tmp_path / "key.json").write_text(key)
-    assert score.main([str(tmp_path), "--key", str(tmp_path / "key.json"), "--out", str(tmp_path / "out")]) == 2
-    said = capsys.readouterr().err
-    assert words in said
-    assert said.count("\n") == 1

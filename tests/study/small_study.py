@@ -110,14 +110,6 @@ def hangs_when_built(budget):
 
 def segfaults_when_built(budget):
     ctypes.string_at(0)
-
-
-def leaves_when_built(budget):
-    sys.exit(0)
-
-
-def closes_when_built(budget):
-    os.closerange(0, 256)
 '''
 # What is told of a run for people; everything else of it has to be the same whoever made it and when.
 NOT_COMPARED = ["seconds", "started_at"]

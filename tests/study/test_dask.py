@@ -44,30 +44,11 @@ def cluster(tmp_path):
         process.wait()
 
 
-SUITE = """\
-name = "own"
-plant = "shell_transfer_arm"
-budget = 400
-budget_per_parameter = [20, 100]
-seeds = 12
-[suite]
-problems = ["arm_sh*"]
-instances = [1, 2]
-[[identifiers]]
-name = "pso"
-"""
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize("suite", [False, True])
-def test_a_dask_cluster_that_loses_a_worker(cluster, start, write_study, tmp_path, undisturbed, suite):
+def test_a_dask_cluster_that_loses_a_worker(cluster, start, write_study, tmp_path, undisturbed):
     address, workers = cluster
     out = tmp_path / "out"
-    file = write_study(SEEDS)
-    if suite:
-        file.write_text(SUITE, encoding="utf-8")
-        undisturbed = run_study(file, 1, out=tmp_path / "alone")
-    process = start(file, "--out", out, "--dask", address)
+    process = start(write_study(SEEDS), "--out", out, "--dask", address)
     end = time.monotonic() + 600.0
     while not (out / "study.sqlite").exists() or not n_runs(out):
         assert process.poll() is None, process.communicate()

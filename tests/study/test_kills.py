@@ -1,5 +1,5 @@
 """Whatever ends a runner or a worker: no finished run is lost, none is there twice, and the rest is made as if nothing
-had been; a second runner is refused; and the clock may jump."""
+had been; and the clock may jump."""
 
 import os
 import random
@@ -83,8 +83,8 @@ def unmeasured():
 
 @pytest.mark.slow
 def test_a_runner_killed_again_and_again(start, write_study, tmp_path, undisturbed):
-    """After more kills than these nearly every run is finished, and none hits a runner at work."""
-    assert killed_again_and_again(start, write_study(SEEDS), tmp_path / "out", 8, random.Random(2)) >= 2
+    """After many kills nearly every run is finished, and none hits a runner at work."""
+    assert killed_again_and_again(start, write_study(SEEDS), tmp_path / "out", 4, random.Random(2)) >= 2
     assert same_results(load_study(tmp_path / "out"), undisturbed)
 
 
@@ -137,30 +137,14 @@ def test_an_interrupt_of_the_workers_cuts_no_run(start, write_study, tmp_path, u
     assert same_results(load_study(tmp_path / "out"), undisturbed)
 
 
-@pytest.mark.slow
-def test_a_second_runner_is_refused_and_harms_nothing(start, write_study, tmp_path, undisturbed):
-    file = write_study(SEEDS)
-    first = start(file, "--out", tmp_path / "out", "--jobs", 1)
-    wait_for(first, tmp_path / "out", 1)
-    # The first might end before the second is there: it stands still meanwhile.
-    first.send_signal(signal.SIGSTOP)
-    second = start(file, "--out", tmp_path / "out", "--jobs", 1)
-    out, err = second.communicate(timeout=600)
-    first.send_signal(signal.SIGCONT)
-    assert (second.returncode, out) == (2, "")
-    assert "another process is at the runs of" in err
-    ended_well(first)
-    assert same_results(load_study(tmp_path / "out"), undisturbed)
-
-
 def test_ctrl_c_keeps_what_is_finished_and_says_how_to_go_on(start, write_study, tmp_path):
-    process = start(write_study(500), "--out", tmp_path / "out", "--jobs", 2)
+    process = start(write_study(60), "--out", tmp_path / "out", "--jobs", 2)
     wait_for(process, tmp_path / "out", 3)
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=600)
     assert (process.returncode, beside_cost(err)) == (130, "")
     assert "interrupted: every finished run is kept, the same command goes on" in out
-    n = int(re.search(r"(\d+) of 8000 are in", out)[1])
+    n = int(re.search(r"(\d+) of 960 are in", out)[1])
     assert n == len(load_study(tmp_path / "out").runs) > 3
     assert [p.name for p in (tmp_path / "out").iterdir()] == [FILE_NAME]
 

@@ -1,11 +1,12 @@
 """What a study asks for: runs, their order, paired noise, and what a changed file keeps."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
-from small_study import RUNS_A_SEED, same_results
+from small_study import RUNS_A_SEED
 
 from armid.study.cases import RunCache, clean_records
 from armid.study.results import load_study
@@ -40,9 +41,9 @@ def test_every_combination_is_there_once_seed_by_seed(write_study):
     assert len(words) == len(planned)
 
 
-def test_without_a_folder_results_go_where_git_ignores_them(write_study, start, tmp_path):
-    process = start(write_study(1), "--only", "row 1/random", "--jobs", "1")
-    assert process.wait() == 0, process.communicate()
+def test_without_a_folder_results_go_where_git_ignores_them(write_study, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    run_study(write_study(1), jobs=1, only="row 1/random")
     assert [path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.sqlite")] == ["out/small/study.sqlite"]
     assert "out/" in (STUDIES.parent / ".gitignore").read_text().splitlines()
 
@@ -122,14 +123,10 @@ def test_a_changed_file_keeps_what_it_still_asks_for(write_study, tmp_path):
     assert not set(other.runs["run"]) & set(first.runs["run"])
     assert set(other.runs["budget"]) == {41}
     # the first file again: nothing is left to do
-    again = run_study(write_study(2), **told)
-    assert again.runs.equals(first.runs)
-    assert same_results(again, first) or again.traces.equals(first.traces)
+    assert run_study(write_study(2), **told).runs.equals(first.runs)
 
 
 def test_a_campaign_is_a_case_and_its_content_counts(write_study, tmp_path, stand):
-    import shutil
-
     source = stand("--manoeuvres", "lower,empty", "--repeats", "2", "--duration", "0.3")
     shutil.copytree(source, tmp_path / "made")
     case = '[[cases]]\nname = "made"\ncampaign = "made"\nrecords = ["lower_2.csv", "empty.csv"]\n' + FIRST_CASE
@@ -145,16 +142,13 @@ def test_a_campaign_is_a_case_and_its_content_counts(write_study, tmp_path, stan
     assert first.settings_of(runs.loc["random", "run"])["campaign"]["records"] == ["lower_2.csv", "empty.csv"]
     text = (tmp_path / "made" / "lower_2.csv").read_text().splitlines()
     (tmp_path / "made" / "lower_2.csv").write_text("\n".join(text[:-1]) + "\n")
-    changed = run_study(write_study(1, change=(FIRST_CASE, case)), **told)
-    assert not set(changed.runs["run"]) & set(first.runs["run"])
+    changed = read_study(write_study(1, change=(FIRST_CASE, case)))
+    assert not {p.run for p in changed.plan()} & set(first.runs["run"])
 
 
-@pytest.mark.parametrize("file", sorted(STUDIES.glob("*.toml")), ids=lambda f: f.stem)
+@pytest.mark.parametrize("file", [f for f in sorted(STUDIES.glob("*.toml")) if "[[identifiers]]" in f.read_text()],
+                         ids=lambda f: f.stem)  # fmt: skip
 def test_the_studies_of_the_project_can_be_read(file):
-    import tomllib
-
-    if "identifiers" not in tomllib.loads(file.read_text()):
-        pytest.skip("a question of another kind")
     study = read_study(file)
     assert next(study.plan()).case == study.cases[0].name
 
