@@ -18,6 +18,7 @@ from armid.estimation.least_squares import Estimates, LeastSquaresProblem
 from armid.estimation.noise_model import MISFIT, NoiseModel, noise_levels, sensor_of
 from armid.model import Array, Plant
 from armid.problem.problem import Replay, by_record, signals_of
+from armid.problem.starts import answers_to_start
 from armid.record import Record
 from armid.record.sensor import FEWEST_REST_SAMPLES, InputNoise, correlation_sum, new_share, runs
 
@@ -210,7 +211,8 @@ def with_answers(
 ) -> WhitenedData:  # fmt: skip
     """Return data whose noise holds what noise of the inputs does at a candidate, to first order.
 
-    replays: of these records. candidate: whole, SI, (n_parameters,).
+    Starts are part of it as well where they are fitted: they are fitted as if what a model leaves was white, and would
+    take up what such noise does later in a record. replays: of these records. candidate: whole, SI, (n_parameters,).
     """
     levels, places = dict(zip(replays, data.levels, strict=True)), dict(zip(replays, data.edges, strict=False))
     blocks = {int(block.at[0]): block for block in data.blocks}
@@ -218,7 +220,9 @@ def with_answers(
         pieces = answers(ready, signals, candidate, noise, [levels[r].rms for r in signals])
         for i, piece in enumerate(pieces):
             at = samples_of([places[r] for r in signals], [r.record.lengths for r in signals], i)
-            white = [levels[r].white(columns.T, [len(columns)]).T for r, columns in zip(signals, piece, strict=True)]
+            starts = answers_to_start(ready.record.pieces[i])
+            moved = [np.hstack(both) for both in zip(piece, starts, strict=True)] if starts else piece
+            white = [levels[r].white(columns.T, [len(columns)]).T for r, columns in zip(signals, moved, strict=True)]
             own = [blocks[int(at[0])].cover.columns] if int(at[0]) in blocks else []
             blocks[int(at[0])] = Block(at, Cover.seen(np.hstack([*own, np.vstack(white)])))
         for j, r in enumerate(signals):

@@ -61,6 +61,19 @@ def with_shown_starts(ready: ReadyRecord) -> ReadyRecord:
     return replace(ready, record=ready.record.with_pieces(shown))
 
 
+def answers_to_start(piece: Piece) -> list[Array]:
+    """Return how the seen signals of a piece answer to its start, where that is fitted.
+
+    Each signal has a column for each start constant, (n_seen, n_constants), moved as far as the fit may move it.
+    """
+    answer = piece.correction
+    if answer is None:
+        return []
+    widths = WIDER_START * np.array([piece.start_deviation[name] for name in piece.shown_start])
+    pairs = zip(answer.slopes.swapaxes(0, 1), answer.samples, strict=True)
+    return [(widths * slopes.T)[samples] for slopes, samples in pairs]
+
+
 def likely_candidate(replays: Sequence[Replay], space: Space) -> Array:
     """Return the whole candidate of 48 over the box that comes nearest to the records, each from its best start."""
     spread = space.complete(probes(space.low[space.free], space.high[space.free], N_PROBES_OF_STARTS))

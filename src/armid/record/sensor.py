@@ -198,7 +198,8 @@ def noise_of_input(values: Array, outputs: Sequence[tuple[Array, bool]]) -> Inpu
     """Return the noise of an input, 0 for a command, which is known exactly.
 
     A command has a few values only. Else it is that at the beginning of the file while the machine stands still; of
-    several lengths of this rest the quietest counts, as the drive may begin before the machine moves.
+    several lengths of this rest the quietest counts, as the drive may begin before the machine moves. Without a rest,
+    as where a controller holds a load, it is what is white in the column.
     values: (n_rows,). outputs: columns of the machine's motion, (n_rows,) each, and whether each is a speed.
     """
     seen = list[float]()
@@ -209,7 +210,24 @@ def noise_of_input(values: Array, outputs: Sequence[tuple[Array, bool]]) -> Inpu
         # of equal values the mean can miss the value by its last digit
         is_equal = np.ptp(values[:n]) == 0.0
         seen.append(0.0 if is_equal else float(np.std(deviations)) * np.sqrt(1.0 + 2.0 * correlation_sum(deviations)))
-    return InputNoise(float(min(seen, default=0.0)), rounding_of_input(values))
+    return InputNoise(float(min(seen)) if seen else white_part(values), rounding_of_input(values))
+
+
+def white_part(values: Array) -> float:
+    """Return the rms of white noise in a column, 0 where it is too large to be noise or where nothing is white.
+
+    Second differences of white noise are correlated by -2/3 from row to row, those of a smooth signal by nearly 1. The
+    stretches of 50 rows in which they are like those of noise tell its size, where they are half of all.
+    """
+    bends = np.diff(values, 2)
+    stretches = bends[: bends.size // FEWEST_REST_SAMPLES * FEWEST_REST_SAMPLES].reshape(-1, FEWEST_REST_SAMPLES)
+    squares = np.sum(stretches**2, axis=1)
+    alike = np.sum(stretches[:, 1:] * stretches[:, :-1], axis=1) / np.maximum(squares, np.finfo(np.float64).tiny)
+    white = np.abs(alike - WHITE_BENDS) < WHITENESS
+    if np.mean(white) < 0.5:
+        return 0.0
+    rms = float(np.sqrt(np.median(squares[white]) / FEWEST_REST_SAMPLES / 6.0))
+    return rms if rms < LARGEST_NOISE * float(np.std(values)) else 0.0
 
 
 def rounding_of_input(values: Array) -> float:
@@ -398,6 +416,9 @@ LEAP = 2.0
 # A signal that runs into the limit of its sensor gets there at no less than this share of its usual rate, over so many
 # samples, and leaves it so: a machine that ends at rest or at an even speed slows down before.
 ABRUPT, RUN_UP = 0.2, 4
+# Correlation of neighbours among second differences of white noise, and how far that of 50 of them may be from it; the
+# largest noise of an input, as a share of how far the input moves.
+WHITE_BENDS, WHITENESS, LARGEST_NOISE = -2.0 / 3.0, 0.2, 0.2
 
 
 @dataclass(frozen=True)
