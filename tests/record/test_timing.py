@@ -17,13 +17,10 @@ def read(write, times, **more):
     return read_campaign(write(lower=columns)).records[0]
 
 
-@pytest.mark.parametrize("times", [
-    np.arange(-100, 1000) / 1000,
-    np.round(np.arange(-100, 1000) / 300, 3),  # rounded to 1 ms, up to 15 % of an interval off
-    np.round(np.arange(-100, 1000) / 800, 4),
-    np.arange(-100, 1000) / 1024 + np.random.default_rng(1).normal(0, 1e-7, 1100) * (np.arange(-100, 1000) != 0),
-])  # fmt: skip
-def test_rounded_times_are_even(write, times):
+@pytest.mark.parametrize(("rate", "digits"), [(1000, 9), (300, 3), (800, 4), (1024, 6)])
+def test_rounded_times_are_even(write, rate, digits):
+    """Rounded to 1 ms they are up to 15 % of an interval off."""
+    times = np.round(np.arange(-100, 1000) / rate, digits)
     record = read(write, times)
     assert record.irregularity is None
     np.testing.assert_array_equal(record.measured, motion(times)[100:])
@@ -83,12 +80,6 @@ def test_irregular_times_are_resampled_with_a_warning(write):
     np.testing.assert_allclose(record.columns["drive_V"], record.times, atol=1e-9)
 
 
-def test_a_missing_sample_is_irregular(write):
-    with pytest.warns(IrregularSamplingWarning, match="largest is 2 times"):
-        record = read(write, np.delete(np.arange(-100, 1000) / 1000, 500))
-    assert record.measured.size == 1000
-
-
 def test_a_held_input_keeps_its_impulse():
     times = np.array([0.0, 0.1, 0.2, 0.35, 0.4] + [0.5 + 0.1 * i for i in range(20)])
     with pytest.warns(IrregularSamplingWarning):
@@ -130,7 +121,6 @@ def test_noise_stays_white_on_the_grid():
 @pytest.mark.parametrize(("times", "found"), [
     (np.arange(1000, 2000) / 1000, "first sample is at 1 s"),
     (np.arange(-1000, 0) / 1000, "0 samples after t = 0"),
-    (np.arange(-1000, 19) / 1000, "19 samples after t = 0"),
     (np.arange(25) * 1e-10, "apart"),
     (np.concatenate([np.arange(100) / 1000, [1e9]]), "unmeasured"),
     (np.arange(19) / 1000, "19 samples"),
@@ -140,7 +130,3 @@ def test_refused(write, times, found):
     folder = write(lower=columns)
     with pytest.raises(ArmidError, match=found):
         read_campaign(folder)
-
-
-def test_twenty_samples_are_enough(write):
-    assert read(write, np.arange(20) / 100).n_samples == 20
