@@ -21,26 +21,12 @@ def itself(omega, level):
     return itself(omega, level)
 
 
-def first(omega, level):
-    """Call a function that calls this one."""
-    return second(omega, level)
-
-
-def second(omega, level):
-    """Call a function that calls this one."""
-    return first(omega, level)
-
-
 def unknown_object(omega, level):
     return TABLE["a"] * omega * level
 
 
 def unknown_module(omega, level):
     return random.random() * omega * level
-
-
-def unknown_builtin(omega, level):
-    return sorted([omega, level])
 
 
 def nothing_returned(omega, level):
@@ -59,16 +45,6 @@ def sometimes_nothing(omega, level):
     if omega > 0:
         return None
     return level
-
-
-def imports(omega, level):
-    import math
-
-    return math.sin(omega) * level
-
-
-def attribute(omega, level):
-    return omega.real.level
 
 
 def or_of_numbers(omega, level):
@@ -92,10 +68,8 @@ exec("def typed_in(omega, level): return -omega * level", typed)
 TOLD = {
     "or": (or_of_numbers, "'omega or 1e-09' joins numbers by `or`: conditions are expected"),
     "calls itself": (itself, "the equation itself calls itself: write it as a loop"),
-    "call each other": (first, "the equation first calls itself: write it as a loop"),
     "object": (unknown_object, r"the equation unknown_object uses 'TABLE' \(dict\), which cannot be compiled: numpy"),
     "module": (unknown_module, r"the equation unknown_module uses 'random' \(module\), which cannot be compiled"),
-    "builtin": (unknown_builtin, "the equation unknown_builtin uses 'sorted', which cannot be compiled"),
     "no return": (nothing_returned, "the equation nothing_returned returns nothing: a number is expected"),
     "default": (odd_default, "the equation odd_default has the default {'a': 1.0}: a number is expected"),
     "no source": (typed["typed_in"], "the source of the equation typed_in cannot be read: define it in a file"),
@@ -105,8 +79,6 @@ TOLD = {
 COMPILED = {
     "arrays": (of_arrays, r"the equation 'bad.torque' cannot be compiled \(numba has no norm\(float64\)\): numpy"),
     "None": (sometimes_nothing, r"the equation 'bad.torque' cannot be compiled \(it does not return a number in every"),
-    "import": (imports, r"the equation 'bad.torque' cannot be compiled \(numba: Use of unsupported opcode"),
-    "attribute": (attribute, r"the equation 'bad.torque' cannot be compiled \(numba: Unknown attribute 'real'"),
 }
 
 

@@ -10,7 +10,7 @@ import pytest
 from arm_cases import Array, drawn
 from armid.engine import Schedule, Simulation, simulate
 from armid.errors import ArmidError
-from armid.model import PLANTS, Effect, Manoeuvre, Model, Parameter
+from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
 
 KILOBYTE = 1024
 AXIS = Model(PLANTS["driven_axis"])
@@ -55,14 +55,10 @@ def test_refused(arm: Model) -> None:
         simulate(AXIS, Manoeuvre(0.001, 60, inputs={"u": np.ones(59)}), [[1.0]])
 
 
-def cubic_drive(omega, gain):
-    """Torque that grows with the cube of the speed: what it drives runs away."""
-    return gain * omega**3
-
-
 @pytest.fixture(scope="module")
-def runaway_arm(arm: Model) -> Model:
-    return arm + Effect("runaway", (Parameter("gain", "effort", 0.0, 50.0, null=0.0),), {"torque": cubic_drive})
+def pushed_arm(arm: Model) -> Model:
+    """What drives it may grow with its speed: friction below 0 makes it run away."""
+    return arm + EFFECTS["viscous"]
 
 
 @pytest.fixture(scope="module")
@@ -97,13 +93,13 @@ def test_neighbours_threads_and_weights_change_no_bit(
 
 @pytest.mark.parametrize("name", ["lower", "raise_empty", "inside_E"])
 def test_beside_candidates_that_diverge(
-    name: str, runaway_arm: Model, manoeuvres: dict[str, Manoeuvre], schedule_for: Callable[[str, str], Schedule]
+    name: str, pushed_arm: Model, manoeuvres: dict[str, Manoeuvre], schedule_for: Callable[[str, str], Schedule]
 ) -> None:
-    calm = np.column_stack([drawn(runaway_arm, 20, 25)[:, :4], np.zeros(20)])
+    calm = np.column_stack([drawn(pushed_arm, 20, 25)[:, :4], np.zeros(20)])
     wild = calm.copy()
-    wild[::3, 4] = 5e4
+    wild[::3, 4] = -1e5
     schedule = replace(schedule_for(name, "standard"), weights=None)
-    alone, mixed = (simulate(runaway_arm, manoeuvres[name], c, schedule) for c in (calm, wild))
+    alone, mixed = (simulate(pushed_arm, manoeuvres[name], c, schedule) for c in (calm, wild))
     others = np.arange(20)[wild[:, 4] == 0.0]
     assert not alone.failed.any()
     assert mixed.failed[::3].all()
@@ -111,16 +107,16 @@ def test_beside_candidates_that_diverge(
     assert np.array_equal(mixed.switch_times["closed"][others], alone.switch_times["closed"][others])
 
 
-def test_a_diverged_candidate_is_nan_from_then_on(runaway_arm: Model, manoeuvres: dict[str, Manoeuvre]) -> None:
-    candidates = np.column_stack([drawn(runaway_arm, 30, 26)[:, :4], np.geomspace(1e3, 1e7, 30)])
+def test_a_diverged_candidate_is_nan_from_then_on(pushed_arm: Model, manoeuvres: dict[str, Manoeuvre]) -> None:
+    candidates = np.column_stack([drawn(pushed_arm, 30, 26)[:, :4], -np.geomspace(1e3, 1e7, 30)])
     for schedule in (Schedule(), Schedule(plan=np.full(1200, 8)), Schedule(3)):
-        found = simulate(runaway_arm, manoeuvres["lower"], candidates, schedule)
+        found = simulate(pushed_arm, manoeuvres["lower"], candidates, schedule)
         lost = np.isnan(found.output)
         assert np.array_equal(lost.any(axis=1), found.failed)
         assert found.failed[-1]
         # once lost, lost for good
         assert np.array_equal(np.maximum.accumulate(lost, axis=1), lost)
-        assert np.nanmax(np.abs(found.output)) <= 1e3 * runaway_arm.plant.scales.speed
+        assert np.nanmax(np.abs(found.output)) <= 1e3 * pushed_arm.plant.scales.speed
 
 
 def test_an_impossible_parameter_fails_alone(arm: Model, manoeuvres: dict[str, Manoeuvre], schedule: Schedule) -> None:
