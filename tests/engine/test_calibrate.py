@@ -81,14 +81,6 @@ def test_long_steps_change_nothing_that_counts(arm: Model, manoeuvres: dict[str,
     assert 0.0 < np.abs(with_plan - without).max() <= 4e-8
 
 
-def test_weights_bring_like_switch_times_together(arm: Model, manoeuvres: dict[str, Manoeuvre]) -> None:
-    weights = calibrate(arm, manoeuvres["lower"], probes(*box_of(arm))).schedule.weights
-    assert weights is not None
-    population = drawn(arm, 300, 6)
-    times = simulate(arm, manoeuvres["lower"], population).switch_times["closed"]
-    assert np.corrcoef(population @ weights, times)[0, 1] > 0.95
-
-
 RUBBED = Model(PLANTS["driven_axis"], (EFFECTS["coulomb"], EFFECTS["viscous"]))
 
 

@@ -197,3 +197,13 @@ def test_the_evidence_of_a_fit_is_its_own_and_not_that_of_one_that_is_gone(monke
         found.fits[key] = Leaves(float(chi2))
         told.append(found.log_posterior(key, "a scale"))
     assert told == [-0.5 * chi2 for chi2 in range(20)]
+
+
+def test_keys_and_what_they_own():
+    key = EffectKey("flux_saturation", "atan", free_shape=True)
+    assert (key.compiled, key.public, key.declared) == (
+        "flux_saturation_atan", "flux_saturation", EffectKey("flux_saturation", "atan"),
+    )  # fmt: skip
+    assert key.owns("flux_saturation_atan.level")
+    assert not key.owns("flux_saturation_atan2.level")
+    assert EffectKey("error_of_R").public == "constant:R"

@@ -151,21 +151,15 @@ def test_numbers_read_back_to_the_bit(tmp_path):
     assert [p.name for p in folder.parent.iterdir()] == ["out"]
 
 
-def test_nothing_is_overwritten_but_an_empty_folder(tmp_path):
+def test_nothing_is_overwritten_and_nothing_half_written_stays(tmp_path):
     (tmp_path / "empty").mkdir()
-    assert (write_campaign(tmp_path / "empty", "", TABLES) / "a.csv").is_file()
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "mine.txt").write_text("mine")
-    with pytest.raises(ArmidError, match="out' exists already"):
-        write_campaign(tmp_path / "out", "", TABLES)
-    with pytest.raises(ArmidError, match=r"mine\.txt' exists already"):
-        write_campaign(tmp_path / "out" / "mine.txt", "", TABLES)
+    folder = write_campaign(tmp_path / "empty", "", TABLES)
+    for there in (folder, folder / "a.csv"):
+        with pytest.raises(ArmidError, match="exists already"):
+            write_campaign(there, "", TABLES)
     with pytest.raises(ArmidError, match="cannot be written"):
-        write_campaign(tmp_path / "out" / "mine.txt" / "below", "", TABLES)
-
-
-def test_nothing_half_written_stays(tmp_path):
+        write_campaign(folder / "a.csv" / "below", "", TABLES)
     uneven = {"a.csv": {"time_s": np.arange(5), "velocity_m_s": np.arange(4)}}
     with pytest.raises(ValueError, match="shorter"):
         write_campaign(tmp_path / "out", "", uneven)
-    assert list(tmp_path.iterdir()) == []
+    assert list(tmp_path.iterdir()) == [folder]

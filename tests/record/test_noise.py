@@ -37,9 +37,11 @@ def test_a_sensor_that_is_stuck_tells_nothing_of_its_noise(rng):
     stuck = signal.copy()
     stuck[500:1300] = stuck[500]
     assert difference_rms(stuck) == pytest.approx(difference_rms(signal), rel=0.1)
-    # a quiet sensor of coarse steps repeats itself, and is not stuck
+    assert difference_rms(MOTION) < 1e-12
+    # a quiet sensor of coarse steps repeats itself, and is not stuck: its noise is that of its steps
     coarse = np.round(MOTION / 0.05) * 0.05
     assert difference_rms(coarse) < 0.01
+    assert noise_of(np.zeros(0), coarse, INTERVAL).rms >= 0.05 / np.sqrt(12) * (1 - 1e-9)
 
 
 @pytest.mark.parametrize("time_constant", [0.002, 0.01])
@@ -74,12 +76,6 @@ def test_few_rest_samples_or_such_as_read_one_value_leave_the_differences(rng, n
 def test_differences_keep_transients_out(rng):
     jerky = MOTION + np.where(np.arange(2000) % 400 < 60, np.sin(np.arange(2000)), 0.0)
     assert difference_rms(jerky + rng.normal(0, 0.005, 2000)) == pytest.approx(0.005, rel=0.3)
-
-
-def test_differences_of_a_smooth_motion_vanish_and_of_a_coarse_one_are_its_steps():
-    assert difference_rms(MOTION) < 1e-12
-    coarse = np.round(MOTION / 0.05) * 0.05
-    assert noise_of(np.zeros(0), coarse, INTERVAL).rms >= 0.05 / np.sqrt(12) * (1 - 1e-9)
 
 
 def test_a_rest_between_motions_tells_the_noise_where_the_input_is_still_too(rng):

@@ -1,9 +1,7 @@
 """Records as sensors make them: held, coarse, at several rates, with wild samples, turns, and clocks that wrap."""
 
-import os
 import re
 import warnings
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,9 +11,6 @@ from armid.model import Model
 from armid.problem.problem import replays
 from armid.problem.space import space_of
 from armid.record import RecordWarning, read_campaign
-from armid.record.resample import timing_of
-from armid.record.signal import signal_of
-from armid.record.table import read_table, time_column
 
 WHEEL = 'name = "wheel"\nplant = "{}"\nhold = "zero"\n{}\n[[records]]\nfile = "a.csv"\nrole = "train"\n'
 N, INTERVAL = 3000, 0.002
@@ -190,30 +185,3 @@ def test_times_that_do_not_rise_are_refused_with_their_cause(write, change, word
     said = refused(write, columns | {"time_s": times})
     for word in words:
         assert word in said, said
-
-
-MEASURED = os.environ.get("ARMID_MEASURED", "")
-SETS = {
-    "cluj_bldc": (["angular_velocity_rad_s"], range(9, 13)),
-    "bam_xl330/camp": (["angular_velocity_rad_s", "angle_rad"], [1]),
-}
-
-
-@pytest.mark.parametrize("name", SETS)
-def test_of_measured_records_nothing_is_left_out(name):
-    headers, holds = SETS[name]
-    folder = Path(MEASURED) / name
-    if not MEASURED or not folder.is_dir():
-        pytest.skip("the measured files are no part of the repository: ARMID_MEASURED names the folder that holds them")
-    for file in sorted(folder.glob("*.csv")):
-        table = read_table(file, file.name)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", RecordWarning)
-            times = time_column(table)
-            timing = timing_of(times, False, file.name)
-            signals = [
-                signal_of(table, header, "rad/s" if "velocity" in header else "rad", 1.0, times, timing)[0]
-                for header in headers
-            ]
-        assert all(signal.broken == () for signal in signals), file.name
-        assert signals[0].sensor.hold in holds

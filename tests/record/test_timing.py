@@ -56,13 +56,6 @@ def test_a_lost_first_sample_does_not_count(write):
     np.testing.assert_allclose(record.measured[1:], motion(np.arange(1, 1000) / 1000), atol=1e-12)
 
 
-def test_a_gap_in_the_rest_does_not_matter(write):
-    times = np.concatenate([np.arange(-200, -100) / 100, np.arange(1000) / 1000])
-    record = read(write, times)
-    assert record.irregularity is None
-    assert record.rest.size == 100
-
-
 def test_irregular_times_are_resampled_with_a_warning(write):
     rng = np.random.default_rng(2)
     times = np.sort(np.arange(1200) / 1000 + rng.uniform(-0.0002, 0.0002, 1200) * (np.arange(1200) > 0))
