@@ -110,8 +110,6 @@ def test_hold_of_the_record_wins(write, axis_columns):
     ("restart_s = 0.01\n", {}, ["restart_s is 0.01", "10 samples", "20"]),
     ("[records.constants]\ngravity_moment = 1.0\n", {"position_m": None}, ["move.csv", "gravity_moment", "position_m"]),
     ("[records.constants]\nstart_speed = 1.0\n", {}, ["start_speed", "first samples"]),
-    ("gyro_range = 1.0\n", {}, ["'gyro_range'", "unknown"]),
-    ("[records.inputs]\nU = 'drive_V'\n", {}, ["'U'", "not an input", "driven_axis"]),
     ("[records.inputs]\nu = 'drive_v'\n", {}, ["'drive_v'", "move.csv", "did you mean 'drive_V'"]),
     ("", {"drive_V": None}, ["move.csv, line 1", "input 'u'", "drive_N_m"]),
     ("", {"drive_V": None, "drive_kN": 1.0}, ["move.csv, line 1", "'drive_kN'", "unknown unit", "drive_N"]),
