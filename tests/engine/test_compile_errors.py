@@ -47,6 +47,16 @@ def sometimes_nothing(omega, level):
     return level
 
 
+def imports(omega, level):
+    import math
+
+    return math.sin(omega) * level
+
+
+def unknown_builtin(omega, level):
+    return sorted([omega, level])
+
+
 def or_of_numbers(omega, level):
     return -level / (omega or 1e-9)
 
@@ -70,6 +80,7 @@ TOLD = {
     "calls itself": (itself, "the equation itself calls itself: write it as a loop"),
     "object": (unknown_object, r"the equation unknown_object uses 'TABLE' \(dict\), which cannot be compiled: numpy"),
     "module": (unknown_module, r"the equation unknown_module uses 'random' \(module\), which cannot be compiled"),
+    "builtin": (unknown_builtin, "the equation unknown_builtin uses 'sorted', which cannot be compiled"),
     "no return": (nothing_returned, "the equation nothing_returned returns nothing: a number is expected"),
     "default": (odd_default, "the equation odd_default has the default {'a': 1.0}: a number is expected"),
     "no source": (typed["typed_in"], "the source of the equation typed_in cannot be read: define it in a file"),
@@ -78,6 +89,7 @@ TOLD = {
 }
 COMPILED = {
     "arrays": (of_arrays, r"the equation 'bad.torque' cannot be compiled \(numba has no norm\(float64\)\): numpy"),
+    "import": (imports, r"the equation 'bad.torque' cannot be compiled \(numba: Use of unsupported opcode"),
     "None": (sometimes_nothing, r"the equation 'bad.torque' cannot be compiled \(it does not return a number in every"),
 }
 

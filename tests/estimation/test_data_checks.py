@@ -172,6 +172,7 @@ MISTAKES: dict[str, tuple[str, tuple[Callable[[Path], None], ...], str]] = {
     "once too long": ("arm", (change("time_s", lambda t: 10 * t, "raise.csv"),), r"raise\.csv.*ten times too long"),
     "ten times too short": ("arm", (change("time_s", lambda t: t / 10, *ALL),), "looks ten times too short"),
     "noise": ("arm", (noise("raise.csv"),), r"raise\.csv: the measured angular_velocity is noise"),
+    "noise alone": ("one", (noise(*ONE),), "the measured angular_velocity is noise"),
     "late": ("arm", (late(0.15, *ALL),), "clock looks 0.1[45].* s late"),
     "late once": ("arm", (late(0.1, "raise.csv"),), r"raise\.csv.*clock looks 0\.(09|10|1).* late"),
     "late alone": ("one", (late(0.15, *ONE),), "clock looks .* late"),

@@ -142,9 +142,10 @@ def saved(figure, path):
     return (image.shape[1] / DPI, image.shape[0] / DPI), float(np.mean(image.min(axis=2) < 0.9))
 
 
-def test_of_many_records_eight_are_drawn_of_both_roles_where_there_are_both(lowering_found, tmp_path):
-    size, ink = saved(convergence_figure(lowering_found), tmp_path / "convergence.png")
-    assert (size, ink > 0.005) == (pytest.approx((6.8, 4.2), abs=0.01), True)
+def test_of_many_records_eight_are_drawn_of_both_roles_where_there_are_both(found, lowering, lowering_found, tmp_path):
+    for one in (lowering_found, found(lowering, fitness="rmse")):
+        size, ink = saved(convergence_figure(one), tmp_path / "convergence.png")
+        assert (size, ink > 0.005) == (pytest.approx((6.8, 4.2), abs=0.01), True)
     size, ink = saved(fit_figure(lowering_found), tmp_path / "fit.png")
     assert (size, ink > 0.01) == (pytest.approx((13.6, 5.5), abs=0.01), True)
     for n_train, n_holdout, drawn in ((9, 0, (8, 0)), (8, 1, (7, 1)), (2, 9, (2, 6)), (10, 4, (4, 4))):

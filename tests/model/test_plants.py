@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from armid.contract.trials import simulate_plainly
 from armid.engine import Schedule, simulate
 from armid.errors import ArmidError
 from armid.inference.candidates import EffectKey, constant_effects
@@ -58,6 +59,16 @@ def test_a_stiff_coupling_without_play_moves_as_the_rigid_arm(told: dict[str, fl
     # 1e6 N m/rad swing at 1/(2 pi) sqrt(K (1/J1 + 1/J2)), some 30 Hz
     swing = simulate(elastic, Manoeuvre(1e-3, 901, told | {"half_play": 0.0}), candidate, Schedule(4)).output - rigid
     assert 1e-3 < np.abs(swing).max() < 0.3
+
+
+def test_a_hub_and_a_tip_exchange_momentum_and_swing_at_their_frequency() -> None:
+    hub, tip, stiffness = 0.06, 0.17, 40.0
+    swing = Manoeuvre(2e-3, 101, {"start_deflection": 0.02}, {"u": np.zeros(101)})
+    candidate = np.array([hub, tip, stiffness, 0.0, 0.0])
+    _, twist, speed, twist_speed = simulate_plainly(Model(PLANTS["flexible_link"]), swing, candidate)
+    np.testing.assert_allclose(hub * speed + tip * (speed + twist_speed), 0.0, atol=1e-9)
+    rate = np.sqrt(stiffness * (1 / hub + 1 / tip))
+    np.testing.assert_allclose(twist, 0.02 * np.cos(rate * swing.times()), atol=1e-8)
 
 
 def test_what_is_known_roughly_is_corrected_wherever_it_stands() -> None:

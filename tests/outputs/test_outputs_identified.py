@@ -5,13 +5,14 @@ import pytest
 from two_inertias import NOISE_ANGLE, NOISE_SPEED, TRUTH, two_inertias, write_drive
 
 from armid.errors import ArmidError
+from armid.estimation.corrections import corrections
 from armid.estimation.examine import examine
 from armid.estimation.identify import identify
 from armid.estimation.identify_document import details_of, result_of
 from armid.identifiers import IDENTIFIERS
 from armid.model import Model
 from armid.problem.fitness import FITNESS, fitness_of_name
-from armid.problem.problem import IdentificationProblem, replays
+from armid.problem.problem import IdentificationProblem, replays, signals_of
 from armid.problem.space import space_of
 from armid.problem.starts import with_starts
 from armid.record import read_campaign, write_table
@@ -36,6 +37,8 @@ def test_the_start_is_fitted_and_leaves_noise(ready) -> None:
     assert [r.name for r in ready] == ["a.csv, motor_speed", "a.csv, load_angle", "a.csv, deflection",
                                        "b.csv, load_angle"]  # fmt: skip
     assert ready[0].ready is ready[1].ready is ready[2].ready is not ready[3].ready
+    for replay, signal in zip(ready, signals_of(ready, WHOLE[np.newaxis]), strict=True):
+        np.testing.assert_array_equal(signal, replay.signal(WHOLE[np.newaxis]))
     started = with_starts(ready, WHOLE)
     for replay, noise in zip(started, (NOISE_SPEED, NOISE_ANGLE, NOISE_ANGLE, NOISE_ANGLE), strict=True):
         residual = replay.measured - replay.signal(WHOLE[np.newaxis])[0]
@@ -55,6 +58,12 @@ def test_the_start_is_fitted_and_leaves_noise(ready) -> None:
     assert np.linalg.norm(near) == pytest.approx(
         np.linalg.norm(own.measured - own.signal(other[np.newaxis])[0]), rel=0.01
     )
+
+
+def test_what_two_signals_of_one_unit_may_have_been_mistaken_for(campaign) -> None:
+    told = {c.kind: c.words for c in corrections(campaign.plant, campaign.train[0], 10)}
+    assert "load_angle and deflection look exchanged" in told["exchanged"]
+    assert "deflection looks counted from the ground" in told["absolute"]
 
 
 def test_samples_that_are_no_data_tell_nothing_of_the_start(tmp_path) -> None:

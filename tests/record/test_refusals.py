@@ -72,6 +72,7 @@ CSV = {
     "empty": ("", ["lower.csv, line 1", "empty", "header"]),
     "not UTF-8": (csv().encode().replace(b"angular", b"\xe4ngular"), ["lower.csv, line 1", "UTF-8"]),
     "UTF-16 without a mark": (csv().encode("utf-16-le"), ["lower.csv, line 1", "readable name"]),
+    "a zip": (b"PK\x03\x04" + bytes(range(128)) * 20, ["lower.csv, line 1"]),
     "binary": (bytes(range(256)) * 20, ["lower.csv, line 1"]),
 }  # fmt: skip
 
@@ -96,6 +97,9 @@ TOML = {
     "missing file key": (GOOD.replace("file =", "# file ="), ["campaign.toml, record 1", "'file'", "missing"]),
     "unknown role": (GOOD.replace('"train"', '"test"'), ["'role' is 'test'", "'train' or 'holdout'"]),
     "no train record": (GOOD.replace('"train"', '"holdout"'), ["campaign.toml", "'train'", "at least one"]),
+    "no word of the shell": (GOOD.replace("shell = true", ""), ["'shell' is missing", "true or false"]),
+    "role of a wrong kind": (GOOD.replace('"train"', "3"), ["record 'lower.csv'", "'role' is 3", "'holdout'"]),
+    "boolean for a number": (GOOD.replace("28.0", "true"), ["'supply_V' is true", "finite number"]),
     "text for a boolean": (GOOD.replace("shell = true", 'shell = "yes"'), ["'shell' is 'yes'", "true or false"]),
     "text for a number": (GOOD.replace("28.0", '"28"'), ["'supply_V' is '28'", "finite number"]),
     "endless integer": (GOOD.replace("28.0", "9" * 5000), ["campaign.toml", "TOML"]),

@@ -99,3 +99,16 @@ def test_motion_at_the_ends_and_what_a_jump_of_an_input_does_are_no_wild_samples
     alone = noise + 12.0 * target * np.exp(-since / 0.05)
     assert found(alone, 1e-4, sudden=after_sudden(target)) == {}
     assert {k: v.tolist() for k, v in found(alone, 1e-4).items()} == {"spikes": [600]}
+
+
+@pytest.mark.parametrize("noise", [0.45, 0.6, 0.9])
+def test_equal_values_of_a_coarse_encoder_are_no_fault_and_a_frozen_one_is(noise):
+    """In steps; the noise of the rest counts with its rounding. 20 records of 3,000 samples of a slow motion."""
+    rng, times = np.random.default_rng(5), np.arange(3000) / 200.0
+    rms, sudden = float(np.hypot(noise, 12.0**-0.5)), np.zeros(3000, dtype=np.bool_)
+    motion = 40.0 * np.sin(0.4 * times)
+    for _ in range(20):
+        values = np.rint(motion + noise * rng.standard_normal(3000))
+        assert not repeated_samples(values, rms, True, Sensor(step=1.0), sudden)["stuck"].any()
+    values[1000:1100] = values[1000]
+    assert repeated_samples(values, rms, True, Sensor(step=1.0), sudden)["stuck"].sum() >= 100
