@@ -40,6 +40,7 @@ def test_recovers_the_truth_of_an_independent_stand(stand, found):
     assert result.holdout.s > 0.9999
 
 
+@pytest.mark.slow
 def test_finds_on_one_stroke_what_the_paper_found(stand, found):
     """Three swarms, 12,000 simulations each, similarity degree: some stop in the valley, so that the median counts."""
     campaign = read_campaign(stand(*CLEAN, *OPTIONS, "--manoeuvres", "lower,empty")).with_window(0.0, 0.7)

@@ -41,7 +41,6 @@ def test_an_axis_comes_in_metres_or_radians() -> None:
         PLANT.for_unit("m/s")
 
 
-@pytest.mark.slow
 def test_a_plant_that_records_one_angle_reads_its_column() -> None:
     plant = replace(PLANTS["rotary_arm"], outputs=(), output="recorded_angle", output_unit="rad")
     assert not plant.records_one_speed
@@ -49,6 +48,7 @@ def test_a_plant_that_records_one_angle_reads_its_column() -> None:
     assert (output.name, output.signal, output.unit) == ("recorded_angle", "recorded_angle", "rad")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("told", [{}, {"theta_C": math.radians(22.0), "theta_D": math.radians(-48.0)}, {"shell": 0.0}])
 def test_a_stiff_coupling_without_play_moves_as_the_rigid_arm(told: dict[str, float]) -> None:
     candidate = np.array([[3.05e6, 1.0, 0.55, 1.4]])
