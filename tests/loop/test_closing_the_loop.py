@@ -256,6 +256,24 @@ def test_a_parameter_at_its_limit_is_told_and_no_name_rests_on_it(axis):
     assert report["error"]["after"]["holdout"] is report["noise_rms_holdout"] is None
 
 
+def test_friction_that_takes_the_whole_drive_is_named_though_its_range_is_half_of_that(axis):
+    """At its steady speed of 1.6 m/s the axis loses all of its 8 N: 5 N s/m, where the range ends at 2.5."""
+    campaign = axis()
+    found = close_loop(
+        Model(campaign.plant), campaign, {n: EFFECTS[n] for n in ("coulomb", "quadratic_drag", "viscous")}
+    )
+    assert (found.effects, found.verdict) == (("viscous",), "explained")
+    assert found.parameters["viscous.slope"] == pytest.approx(5.0, rel=1e-3)
+
+
+def test_what_the_records_give_up_to_a_common_factor_is_told_of_rough_constants_too(axis):
+    """A force in proportion to a current moves a mass against friction: scaled alike, all three move it the same."""
+    campaign = axis("[tolerances]\ndefault = 0.5\n[parameters.mass]\nfixed = 2.0\n")
+    found = close_loop(Model(campaign.plant), campaign, {"viscous": EFFECTS["viscous"]})
+    assert found.effects == ("viscous",)
+    assert report_of(found)["known_together"] == ["these records give mass, gain up to a common factor"]
+
+
 def test_what_the_records_cannot_show_widens_an_interval_as_far_as_it_is_probable(axis):
     """Force, mass and friction that grow alike leave the motion as it is."""
     campaign = axis()

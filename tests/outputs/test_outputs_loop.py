@@ -25,7 +25,7 @@ FRICTION = 0.3
 def closed(tmp_path_factory):
     folder = write_drive(tmp_path_factory.mktemp("loop") / "drive", FRICTION, 0.03)
     campaign = read_campaign(folder, {"two_inertias": two_inertias})
-    wanted = {name: EFFECTS[name] for name in ("coulomb", "viscous", "gyro_bias")}
+    wanted = {name: EFFECTS[name] for name in ("coulomb", "viscous", "stribeck", "gyro_bias")}
     return close_loop(campaign.model(), campaign, {**wanted, **sensor_effects(campaign.plant)})
 
 
