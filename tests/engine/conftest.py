@@ -7,7 +7,7 @@ import pytest
 
 from arm_cases import box_of, index_rows, manoeuvre_of
 from armid.engine import Schedule, calibrate, probes
-from armid.model import EFFECTS, Manoeuvre, Model
+from armid.model import EFFECTS, Manoeuvre, Model, applicable
 
 
 @pytest.fixture(scope="session")
@@ -18,6 +18,12 @@ def manoeuvres() -> dict[str, Manoeuvre]:
 @pytest.fixture(scope="session")
 def rubbing_arm(arm: Model) -> Model:
     return arm + EFFECTS["coulomb"] + EFFECTS["viscous"]
+
+
+@pytest.fixture(scope="session")
+def wide(arm: Model) -> Model:
+    """The arm with every effect, compiled for tests/contract and tests/model as well."""
+    return Model(arm.plant, tuple(applicable(EFFECTS, arm.plant).values()))
 
 
 @pytest.fixture(scope="session")

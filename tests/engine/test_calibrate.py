@@ -21,9 +21,6 @@ def test_probes_fill_the_box(arm: Model) -> None:
     # every tenth of every side is visited about as often as it should
     for side in spread.T:
         assert np.histogram(side, 10, (0.0, 1.0))[0].min() >= 14
-
-
-def test_a_model_without_parameters_has_probes() -> None:
     assert probes(np.empty(0), np.empty(0), 3).shape == (3, 0)
 
 
@@ -71,10 +68,8 @@ def test_long_steps_are_taken_where_candidates_could_try_them(arm: Model, manoeu
         switched = simulate(arm, manoeuvres[name], spread, Schedule(2)).switch_times["closed"]
         longest_from = int(np.argmax(found.schedule.plan == found.schedule.plan.max()))
         assert np.count_nonzero(switched > 1e-3 * longest_from) >= 8
-
-
-def test_where_all_have_switched_no_step_is_long(arm: Model, manoeuvres: dict[str, Manoeuvre]) -> None:
-    assert calibrate(arm, manoeuvres["inside_E"], probes(*box_of(arm))).schedule.plan is None
+    # where all have switched none is long
+    assert calibrate(arm, manoeuvres["inside_E"], spread).schedule.plan is None
 
 
 def test_long_steps_change_nothing_that_counts(arm: Model, manoeuvres: dict[str, Manoeuvre]) -> None:
@@ -84,14 +79,6 @@ def test_long_steps_change_nothing_that_counts(arm: Model, manoeuvres: dict[str,
         simulate(arm, manoeuvres["lower"], population, s).output for s in (schedule, replace(schedule, plan=None))
     )
     assert 0.0 < np.abs(with_plan - without).max() <= 4e-8
-
-
-def test_weights_bring_like_switch_times_together(arm: Model, manoeuvres: dict[str, Manoeuvre]) -> None:
-    weights = calibrate(arm, manoeuvres["lower"], probes(*box_of(arm))).schedule.weights
-    assert weights is not None
-    population = drawn(arm, 300, 6)
-    times = simulate(arm, manoeuvres["lower"], population).switch_times["closed"]
-    assert np.corrcoef(population @ weights, times)[0, 1] > 0.95
 
 
 RUBBED = Model(PLANTS["driven_axis"], (EFFECTS["coulomb"], EFFECTS["viscous"]))

@@ -21,26 +21,12 @@ def itself(omega, level):
     return itself(omega, level)
 
 
-def first(omega, level):
-    """Call a function that calls this one."""
-    return second(omega, level)
-
-
-def second(omega, level):
-    """Call a function that calls this one."""
-    return first(omega, level)
-
-
 def unknown_object(omega, level):
     return TABLE["a"] * omega * level
 
 
 def unknown_module(omega, level):
     return random.random() * omega * level
-
-
-def unknown_builtin(omega, level):
-    return sorted([omega, level])
 
 
 def nothing_returned(omega, level):
@@ -67,8 +53,8 @@ def imports(omega, level):
     return math.sin(omega) * level
 
 
-def attribute(omega, level):
-    return omega.real.level
+def unknown_builtin(omega, level):
+    return sorted([omega, level])
 
 
 def or_of_numbers(omega, level):
@@ -92,7 +78,6 @@ exec("def typed_in(omega, level): return -omega * level", typed)
 TOLD = {
     "or": (or_of_numbers, "'omega or 1e-09' joins numbers by `or`: conditions are expected"),
     "calls itself": (itself, "the equation itself calls itself: write it as a loop"),
-    "call each other": (first, "the equation first calls itself: write it as a loop"),
     "object": (unknown_object, r"the equation unknown_object uses 'TABLE' \(dict\), which cannot be compiled: numpy"),
     "module": (unknown_module, r"the equation unknown_module uses 'random' \(module\), which cannot be compiled"),
     "builtin": (unknown_builtin, "the equation unknown_builtin uses 'sorted', which cannot be compiled"),
@@ -104,9 +89,8 @@ TOLD = {
 }
 COMPILED = {
     "arrays": (of_arrays, r"the equation 'bad.torque' cannot be compiled \(numba has no norm\(float64\)\): numpy"),
-    "None": (sometimes_nothing, r"the equation 'bad.torque' cannot be compiled \(it does not return a number in every"),
     "import": (imports, r"the equation 'bad.torque' cannot be compiled \(numba: Use of unsupported opcode"),
-    "attribute": (attribute, r"the equation 'bad.torque' cannot be compiled \(numba: Unknown attribute 'real'"),
+    "None": (sometimes_nothing, r"the equation 'bad.torque' cannot be compiled \(it does not return a number in every"),
 }
 
 

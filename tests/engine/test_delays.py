@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from arm_cases import index_rows, manoeuvre_of
+from armid.contract.trials import nominal
 from armid.engine import Schedule, along, calibrate, simulate
 from armid.errors import ArmidError
 from armid.model import EFFECTS, PLANTS, Delay, Effect, Guard, Manoeuvre, Model, Parameter, distinct
@@ -123,23 +123,32 @@ def test_a_computed_signal_comes_out_of_the_history_however_short_the_delay():
     assert np.all(errors[4][[0, 1, 2, 4]] <= errors[2][[0, 1, 2, 4]] / 10.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stroke", ["lower", "raise"])
-def test_a_late_control_moves_the_arm_as_on_the_test_stand(stroke):
+def test_a_late_control_moves_the_arm_as_on_the_test_stand(stroke, wide, manoeuvres):
     """Switches, kinks and samples that are repeated with finer steps, all with their past; beside a punctual lane."""
-    model = Model(PLANTS["shell_transfer_arm"]) + EFFECTS["controller_delay"]
-    manoeuvre = manoeuvre_of(next(row for row in index_rows() if row["manoeuvre"] == stroke), 0.001, 1201)
-    plain = {"p0": 3.05e6, "k": 1.0, "eta3": 0.55, "n": 1.4}
+    plain, rest = {"p0": 3.05e6, "k": 1.0, "eta3": 0.55, "n": 1.4}, dict(zip(wide.parameters, nominal(wide)))
     delays = [0.0, 0.0004, 0.0023, 0.0101, 0.0253]
-    population = candidates(model, [plain | {"controller_delay.delay": d} for d in delays])
-    found = simulate(model, manoeuvre, population, Schedule(4)).output
-    filtered = Model(model.plant) + EFFECTS["controller_delay"].in_form("feedback_filter")
-    missed = simulate(filtered.exact, manoeuvre, population).output - simulate(filtered, manoeuvre, population).output
+    population = candidates(wide, [rest | plain | {"controller_delay.delay": d} for d in delays])
+    found = simulate(wide, manoeuvres[stroke], population, Schedule(4)).output
     for i, delay in enumerate(delays):
         stood = simulate_on_stand(Motion(Arm(*plain.values()), KNOWN[stroke], Effects(controller_delay=delay)), 1.2)
         assert np.abs(found[i] - stood.gyro).max() <= 2e-8
-        np.testing.assert_array_equal(simulate(model, manoeuvre, population[i], Schedule(4)).output[0], found[i])
-    # the filter knows its own error: what its form that is exact makes of the same candidate
-    assert np.abs(missed[0]).max() == 0.0
+        np.testing.assert_array_equal(
+            simulate(wide, manoeuvres[stroke], population[i], Schedule(4)).output[0], found[i]
+        )
+    # the filter, tried alone by tests/contract too, comes near to the dead time and is not it
+    filtered = Model(wide.plant) + EFFECTS["controller_delay"].in_form("feedback_filter")
+    missed = (
+        found
+        - simulate(
+            filtered,
+            manoeuvres[stroke],
+            candidates(filtered, [plain | {"controller_delay.delay": d} for d in delays]),
+            Schedule(4),
+        ).output
+    )
+    assert np.abs(missed[0]).max() < 1e-9
     assert 1e-4 < np.abs(missed[-1]).max() < 1e-2
 
 
@@ -234,6 +243,7 @@ def test_one_effect_under_two_names_is_looked_for_once():
     filters = [f for f in EFFECTS["controller_delay"].every_form if f not in EFFECTS["controller_delay"].searched_forms]
     assert [f.form for f in filters] == ["feedback_filter", "command_filter", "voltage_filter"]
     assert [f.exact.form for f in filters] == ["feedback", "command", "voltage"]
+    assert [e.form for e in (Model(PLANTS["shell_transfer_arm"]) + filters[0]).exact.effects] == ["feedback"]
 
 
 def test_the_voltage_of_a_plug_in_is_late_exactly_and_its_derivative_by_the_delay():

@@ -9,16 +9,11 @@ import pytest
 from arm_cases import Array, drawn
 from armid.engine import Schedule, simulate
 from armid.engine.generate import FEWEST_IDLE, strengths_of
-from armid.model import EFFECTS, Manoeuvre, Model, applicable
+from armid.model import EFFECTS, Manoeuvre, Model
 
 pytestmark = pytest.mark.slow
-# Those that are tried, of all that one compiled model holds (that of tests/contract and tests/model).
+# Those that are tried, of all that one compiled model holds.
 NAMES = ("coulomb", "viscous", "tilt", "gas_heat_loss", "gyro_lag", "shell_rocking", "controller_delay", "gyro_bias")
-
-
-@pytest.fixture(scope="module")
-def wide(arm: Model) -> Model:
-    return Model(arm.plant, tuple(applicable(EFFECTS, arm.plant).values()))
 
 
 @pytest.fixture(scope="module")
@@ -55,13 +50,12 @@ def test_neighbours_that_use_other_effects_change_nothing(
 
 
 def test_the_motion_is_that_of_the_model_without_what_is_inactive(
-    arm: Model, wide: Model, manoeuvres: dict[str, Manoeuvre], schedule: Schedule
+    arm: Model, rubbing_arm: Model, wide: Model, manoeuvres: dict[str, Manoeuvre], schedule: Schedule
 ) -> None:
     """The plant alone, and with two effects, few enough that both are evaluated."""
-    with_two = arm + EFFECTS["shell_rocking"] + EFFECTS["controller_delay"]
     # A delay of 0 switches at once, and behind a switch no step is long: only even steps are the same.
     even = replace(schedule, plan=None)
-    for name, small in (("", arm), ("shell_rocking", with_two), ("controller_delay", with_two)):
+    for name, small in (("", arm), ("coulomb", rubbing_arm), ("viscous", rubbing_arm)):
         candidate = using(wide, drawn(arm, 1, 8)[0], name)
         values = dict(zip(wide.parameters, candidate))
         expected = simulate(small, manoeuvres["lower"], [values[n] for n in small.parameters], even).output

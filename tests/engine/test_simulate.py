@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from arm_cases import Array, drawn
-from armid.engine import Schedule, Simulation, simulate
+from armid.contract.trials import PlainModel
+from armid.engine import Schedule, Simulation, along, simulate
 from armid.errors import ArmidError
-from armid.model import PLANTS, Effect, Manoeuvre, Model, Parameter
+from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
 
 KILOBYTE = 1024
 AXIS = Model(PLANTS["driven_axis"])
@@ -55,14 +56,10 @@ def test_refused(arm: Model) -> None:
         simulate(AXIS, Manoeuvre(0.001, 60, inputs={"u": np.ones(59)}), [[1.0]])
 
 
-def cubic_drive(omega, gain):
-    """Torque that grows with the cube of the speed: what it drives runs away."""
-    return gain * omega**3
-
-
 @pytest.fixture(scope="module")
-def runaway_arm(arm: Model) -> Model:
-    return arm + Effect("runaway", (Parameter("gain", "effort", 0.0, 50.0, null=0.0),), {"torque": cubic_drive})
+def pushed_arm(arm: Model) -> Model:
+    """What drives it may grow with its speed: friction below 0 makes it run away."""
+    return arm + EFFECTS["viscous"]
 
 
 @pytest.fixture(scope="module")
@@ -97,13 +94,13 @@ def test_neighbours_threads_and_weights_change_no_bit(
 
 @pytest.mark.parametrize("name", ["lower", "raise_empty", "inside_E"])
 def test_beside_candidates_that_diverge(
-    name: str, runaway_arm: Model, manoeuvres: dict[str, Manoeuvre], schedule_for: Callable[[str, str], Schedule]
+    name: str, pushed_arm: Model, manoeuvres: dict[str, Manoeuvre], schedule_for: Callable[[str, str], Schedule]
 ) -> None:
-    calm = np.column_stack([drawn(runaway_arm, 20, 25)[:, :4], np.zeros(20)])
+    calm = np.column_stack([drawn(pushed_arm, 20, 25)[:, :4], np.zeros(20)])
     wild = calm.copy()
-    wild[::3, 4] = 5e4
+    wild[::3, 4] = -1e5
     schedule = replace(schedule_for(name, "standard"), weights=None)
-    alone, mixed = (simulate(runaway_arm, manoeuvres[name], c, schedule) for c in (calm, wild))
+    alone, mixed = (simulate(pushed_arm, manoeuvres[name], c, schedule) for c in (calm, wild))
     others = np.arange(20)[wild[:, 4] == 0.0]
     assert not alone.failed.any()
     assert mixed.failed[::3].all()
@@ -111,16 +108,16 @@ def test_beside_candidates_that_diverge(
     assert np.array_equal(mixed.switch_times["closed"][others], alone.switch_times["closed"][others])
 
 
-def test_a_diverged_candidate_is_nan_from_then_on(runaway_arm: Model, manoeuvres: dict[str, Manoeuvre]) -> None:
-    candidates = np.column_stack([drawn(runaway_arm, 30, 26)[:, :4], np.geomspace(1e3, 1e7, 30)])
+def test_a_diverged_candidate_is_nan_from_then_on(pushed_arm: Model, manoeuvres: dict[str, Manoeuvre]) -> None:
+    candidates = np.column_stack([drawn(pushed_arm, 30, 26)[:, :4], -np.geomspace(1e3, 1e7, 30)])
     for schedule in (Schedule(), Schedule(plan=np.full(1200, 8)), Schedule(3)):
-        found = simulate(runaway_arm, manoeuvres["lower"], candidates, schedule)
+        found = simulate(pushed_arm, manoeuvres["lower"], candidates, schedule)
         lost = np.isnan(found.output)
         assert np.array_equal(lost.any(axis=1), found.failed)
         assert found.failed[-1]
         # once lost, lost for good
         assert np.array_equal(np.maximum.accumulate(lost, axis=1), lost)
-        assert np.nanmax(np.abs(found.output)) <= 1e3 * runaway_arm.plant.scales.speed
+        assert np.nanmax(np.abs(found.output)) <= 1e3 * pushed_arm.plant.scales.speed
 
 
 def test_an_impossible_parameter_fails_alone(arm: Model, manoeuvres: dict[str, Manoeuvre], schedule: Schedule) -> None:
@@ -157,3 +154,26 @@ def test_memory_is_flat_beyond_the_output(arm: Model) -> None:
     found = simulate(arm, Manoeuvre(0.001, 2000), drawn(arm, 1280, 2))
     grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before
     assert grown * KILOBYTE <= found.output.nbytes + 4 * KILOBYTE**2
+
+
+TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])
+
+
+def test_quantities_and_latches_agree_with_one_moment_at_a_time(arm):
+    manoeuvre = Manoeuvre(0.001, 800)
+    names = ["demand", "voltage", "back_emf", "balance_torque", "torque", "total_inertia"]
+    found = along(arm, manoeuvre, TRUTH, Schedule(4), [*names, *arm.states])
+    run = simulate(arm, manoeuvre, TRUTH[np.newaxis], Schedule(4), states=True)
+    closed = run.switch_times["closed"][0]
+    assert np.array_equal(found["omega"], run.states["omega"][0])
+    plain = PlainModel(arm, manoeuvre, TRUTH)
+    for i in (0, 100, 500, 577, 579, 799):
+        states = np.array([found[s][i] for s in arm.states])
+        moment = plain.moment(0.001 * i, states, (float(0.001 * i >= closed),))
+        assert np.allclose(plain.evaluate(names, moment), [found[n][i] for n in names], rtol=1e-12)
+    assert 0.5 < closed < 0.7
+
+
+def test_an_unknown_name_is_refused_with_the_nearest(arm):
+    with pytest.raises(ArmidError, match=r"'curent' is not a name of plant 'shell_transfer_arm'.*current"):
+        along(arm, Manoeuvre(0.001, 50), TRUTH, Schedule(), ["curent"])

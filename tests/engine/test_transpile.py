@@ -99,21 +99,6 @@ def falls(h):
     return h - 0.2
 
 
-@pytest.mark.slow
-def test_names_of_the_loop_numpy_and_builtins_can_be_used() -> None:
-    states = tuple(State(n, "1", one, one) for n in NAMES)
-    guards = (Guard("kink", falls), Guard("n", falls, latch=True))
-    parameters = (Parameter("x", "1", 0.0, 1.0, null=0.0), Parameter("time_of", "1", 0.0, 1.0))
-    odd = Effect("odd", parameters, {"output": with_names_of_the_loop}, states, guards)
-    few = tuple(State(n, "1", one, one) for n in ("np", "abs", "span"))
-    more = Effect("more", (Parameter("x", "1", 0.0, 1.0, null=0.0),), {"output": on_lanes}, few)
-    found = simulate(Model(ramp) + odd + more, Manoeuvre(1 / 64, 5), [[0.0, 0.0, 0.5, 0.25]], states=True)
-    now = 1.0 + np.arange(5) / 64
-    expected = (1 + 8 + 4) * now + now**2 + now**2 + 0.25
-    np.testing.assert_allclose(found.output[0], expected, rtol=1e-14)
-    assert set(found.states) == {"omega", *(f"odd.{n}" for n in NAMES), "more.np", "more.abs", "more.span"}
-
-
 def waits(clock):
     return 0.5 - clock
 
@@ -123,17 +108,29 @@ def after(on, clock, level):
     return level * on * (clock - 0.5)
 
 
-def test_an_effect_may_bring_its_own_clock_and_switch() -> None:
-    late = Effect("late", (Parameter("level", "1", 0.0, 1.0, null=0.0),), {"output": after},
-                  (State("clock", "s", one, zero),), (Guard("on", waits, latch=True),))  # fmt: skip
-    found = simulate(Model(ramp) + late, Manoeuvre(0.03, 41), [[0.0, 2.0]])
-    assert found.switch_times["late.on"][0] == pytest.approx(0.5, abs=1e-12)
-    times = 0.03 * np.arange(41)
-    np.testing.assert_allclose(found.output[0], 2.0 * np.maximum(times - 0.5, 0.0), atol=1e-12)
-
-
 def zero():
     return 0.0
+
+
+@pytest.mark.slow
+def test_names_of_the_loop_numpy_and_builtins_and_an_own_clock_and_switch_can_be_used() -> None:
+    states = tuple(State(n, "1", one, one) for n in NAMES)
+    guards = (Guard("kink", falls), Guard("n", falls, latch=True))
+    parameters = (Parameter("x", "1", 0.0, 1.0, null=0.0), Parameter("time_of", "1", 0.0, 1.0))
+    odd = Effect("odd", parameters, {"output": with_names_of_the_loop}, states, guards)
+    few = tuple(State(n, "1", one, one) for n in ("np", "abs", "span"))
+    more = Effect("more", (Parameter("x", "1", 0.0, 1.0, null=0.0),), {"output": on_lanes}, few)
+    late = Effect("late", (Parameter("level", "1", 0.0, 1.0, null=0.0),), {"output": after},
+                  (State("clock", "s", one, zero),), (Guard("on", waits, latch=True),))  # fmt: skip
+    candidates = [[0.0, 0.0, 0.5, 0.25, level] for level in (0.0, 2.0)]
+    found = simulate(Model(ramp) + odd + more + late, Manoeuvre(0.03, 41), candidates, states=True)
+    times = 0.03 * np.arange(41)
+    now = 1.0 + times
+    expected = (1 + 8 + 4) * now + now**2 + now**2 + 0.25
+    np.testing.assert_allclose(found.output[0], expected, rtol=1e-14)
+    assert set(found.states) >= {"omega", *(f"odd.{n}" for n in NAMES), "more.np", "more.abs", "more.span"}
+    assert found.switch_times["late.on"] == pytest.approx(0.5, abs=1e-12)
+    np.testing.assert_allclose(found.output[1] - expected, 2.0 * np.maximum(times - 0.5, 0.0), atol=1e-12)
 
 
 def of_constants(gain, gravity_moment):

@@ -38,20 +38,35 @@ def by_pymoo(problem: IdentificationProblem, meter: Meter, identifier: Identifie
     return used
 
 
-@pytest.mark.parametrize("seed", [0, 3])
-def test_the_log_is_that_of_minimize(posed, seed) -> None:
-    for name in (*OWN, *COMPOSED):
-        check_log(posed, name, seed)
-
-
-def check_log(posed, name, seed) -> None:
+@pytest.mark.parametrize("name", [*OWN, *COMPOSED])
+def test_the_log_is_that_of_minimize(posed, name) -> None:
     (problem, meter), (other, theirs), used = posed(), posed(), []
     identifier = identifier_of(name, IDENTIFIERS)
-    search(problem, meter, identifier, seed, lambda m: used.append(m.used))
-    generations = by_pymoo(other, theirs, identifier, seed)
+    search(problem, meter, identifier, 3, lambda m: used.append(m.used))
+    generations = by_pymoo(other, theirs, identifier, 3)
     for ours, expected in zip(meter.log(), theirs.log(), strict=True):
         np.testing.assert_array_equal(ours, expected)
     assert used == generations
+
+
+@pytest.mark.parametrize("name", ALONE)
+def test_an_error_of_the_problem_comes_out(posed, monkeypatch, name) -> None:
+    for error in (ZeroDivisionError("mine"), KeyboardInterrupt(), StopIteration()):
+        problem, meter = posed()
+        answered, left, after = problem.answered, [1 if name.startswith(("random", "sobol", "pso")) else 4], [0]
+
+        def failing(X: Any, residuals: bool = False, *, error=error, answered=answered, left=left, after=after) -> Any:
+            left[0] -= 1
+            if left[0] < 0:
+                after[0] += 1
+                raise error
+            return answered(X, residuals)
+
+        monkeypatch.setattr(problem, "answered", failing)
+        with pytest.raises(type(error)) as came:
+            run(identifier_of(name, IDENTIFIERS).build(BUDGET), problem, 1, lambda meter=meter: meter.exhausted)
+        assert came.value is error
+        assert after == [1]
 
 
 def test_it_ends_at_the_target_where_minimize_does(posed) -> None:
@@ -64,32 +79,6 @@ def test_it_ends_at_the_target_where_minimize_does(posed) -> None:
         by_pymoo(other, theirs, identifier, 1)
         assert 0 < meter.used == theirs.used <= first.used
         assert meter.best_f == theirs.best_f <= target
-
-
-@pytest.mark.parametrize("error", [ZeroDivisionError("mine"), KeyboardInterrupt(), StopIteration()], ids=repr)
-def test_an_error_of_the_problem_comes_out(posed, monkeypatch, error) -> None:
-    for name in ALONE:
-        check_error(posed, monkeypatch, name, error)
-
-
-def check_error(posed, monkeypatch, name, error) -> None:
-    problem, meter = posed()
-    answered, left, after = problem.answered, [4], [0]
-
-    def failing(X: Any, residuals: bool = False) -> Any:
-        left[0] -= 1
-        if left[0] < 0:
-            after[0] += 1
-            raise error
-        return answered(X, residuals)
-
-    monkeypatch.setattr(problem, "answered", failing)
-    if name.startswith(("random", "sobol", "pso")):
-        left[0] = 1
-    with pytest.raises(type(error)) as came:
-        run(identifier_of(name, IDENTIFIERS).build(BUDGET), problem, 1, lambda: meter.exhausted)
-    assert came.value is error
-    assert after == [1]
 
 
 def test_what_pymoo_is_given_to_see_to_it_sees_to(posed) -> None:

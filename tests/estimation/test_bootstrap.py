@@ -43,14 +43,26 @@ def minimum(fitness, replay, space):
     return found.draws[0]
 
 
-def test_least_squares_scatters_as_the_cramer_rao_bound_says(stroke, arm_space):
+def test_least_squares_scatters_as_the_cramer_rao_bound_says(stroke, arm_space, monkeypatch):
     x = minimum(SQUARES, stroke, arm_space)
     information = information_at((stroke,), arm_space, x)
-    found = bootstrap(SQUARES, (stroke,), arm_space, x, information)
+    seen = []
+    found = bootstrap(SQUARES, (stroke,), arm_space, x, information, 0,
+                      lambda state: seen.append((state.used, state.budget, state.what)))  # fmt: skip
+    assert seen == sorted(seen)
+    assert seen[0] == (0, 100, "draws of the noise")
     assert not found.doubt
     np.testing.assert_allclose(found.draws.std(axis=0) / information.deviation, 1.0, atol=0.25)
     np.testing.assert_allclose((found.high - found.low) / information.half_width, 2.0, atol=0.5)
     assert np.abs(found.moved).max() < 0.2
+    # skewed estimates would get the quantiles of many draws
+    monkeypatch.setattr(bootstraps, "SKEWED", 0.0)
+    monkeypatch.setattr(bootstraps, "MANY_DRAWS", 150)
+    found = bootstrap(SQUARES, (stroke,), arm_space, x, information)
+    assert len(found.draws) == 150
+    np.testing.assert_allclose([found.low, found.high], np.quantile(found.draws, (0.025, 0.975), axis=0))
+    stopped = bootstrap(SQUARES, (stroke,), arm_space, x, information, 0, lambda _: True)
+    assert stopped.doubt == "the bootstrap was interrupted"
 
 
 def test_the_intervals_of_a_minimax_hold_the_truth_and_those_of_least_squares_do_not(stroke, arm_space):
@@ -65,15 +77,6 @@ def test_the_intervals_of_a_minimax_hold_the_truth_and_those_of_least_squares_do
     assert ((misses <= half).mean(axis=0) >= 0.85).all()
     assert (half < 1.3 * 1.96 * misses.std(axis=0) / np.sqrt(1.0 - 2.0 / np.pi)).all()
     assert ((misses <= information.half_width).mean(axis=0) < 0.6).all()
-
-
-def test_skewed_estimates_get_the_quantiles_of_many_draws(stroke, arm_space, monkeypatch):
-    monkeypatch.setattr(bootstraps, "SKEWED", 0.0)
-    monkeypatch.setattr(bootstraps, "MANY_DRAWS", 150)
-    x = minimum(SQUARES, stroke, arm_space)
-    found = bootstrap(SQUARES, (stroke,), arm_space, x, information_at((stroke,), arm_space, x))
-    assert len(found.draws) == 150
-    np.testing.assert_allclose([found.low, found.high], np.quantile(found.draws, (0.025, 0.975), axis=0))
 
 
 def test_without_convergence_there_is_no_interval(stroke, arm_space):
@@ -91,21 +94,6 @@ def test_without_noise_and_where_nothing_is_determined_there_is_no_interval(stro
     assert "holds no noise" in bootstrap(MINIMAX, (stroke,), arm_space, TRUTH, silent).doubt
     lost = replace(information, deviation=information.deviation * [1, np.inf, 1, 1])
     assert "do not determine k" in bootstrap(MINIMAX, (stroke,), arm_space, TRUTH, lost).doubt
-
-
-def test_it_tells_how_far_it_is_and_stops_when_it_is_told_to(stroke, arm_space):
-    seen = []
-
-    def progress(state):
-        seen.append((state.used, state.budget, state.what))
-        return len(seen) == 25
-
-    found = bootstrap(SQUARES, (stroke,), arm_space, TRUTH, information_at((stroke,), arm_space, TRUTH), 1, progress)
-    assert found.doubt == "the bootstrap was interrupted"
-    assert len(seen) == 25
-    counts = [used for used, *_ in seen]
-    assert counts == sorted(counts)
-    assert seen[0] == (0, 100, "draws of the noise")
 
 
 def test_the_noise_that_is_drawn_has_the_level_and_the_colour_of_the_record():

@@ -71,13 +71,10 @@ def toml(*pairs, more=""):
     return made
 
 
-def radians(key, count=0):
-    def made(folder):
-        path = folder / "campaign.toml"
-        found = re.compile(rf"^({key}_deg) = (.*)$", re.MULTILINE)
-        path.write_text(found.sub(lambda m: f"{m[1]} = {np.deg2rad(float(m[2])):.4f}", path.read_text(), count))
-
-    return made
+def angles_in_radians(folder):
+    path = folder / "campaign.toml"
+    found = re.compile(r"^(.*_angle_deg) = (.*)$", re.MULTILINE)
+    path.write_text(found.sub(lambda m: f"{m[1]} = {np.deg2rad(float(m[2])):.4f}", path.read_text()))
 
 
 def exchange(a, b):
@@ -98,14 +95,11 @@ def exchange_column(column, a, b):
     return made
 
 
-def copied(source, name, role, begin=-1.0, end=9.0, more=""):
-    """Return a mistake: a part of a recording under another name, as another record."""
+def copied(source, name, role, more=""):
+    """Return a mistake: a recording under another name, as another record."""
 
     def made(folder):
-        columns = read_table(folder / source, source).columns
-        times = columns["time_s"]
-        kept = (times >= begin) & (times <= end)
-        write_table(folder / name, {n: v[kept] for n, v in columns.items()})
+        shutil.copy(folder / source, folder / name)
         text = (folder / "campaign.toml").read_text()
         entry = next(e for e in text.split("[[records]]") if f'"{source}"' in e).strip()
         entry = re.sub('role = "[a-z]+"', f'role = "{role}"', entry.replace(source, name))
@@ -164,75 +158,40 @@ def bounds(text):
 
 # Of the strokes at 1 kHz every so many-th sample is kept: a mistake shows in them as well, in half of the time.
 EVERY = 4
-NO_RANGE = toml(("gyro_range_deg_s = 200\n", ""))
-WINDOW, ONE = toml(("window_s = [0.0, 0.7]\n", "")), ("lower.csv",)
+NO_RANGE, ONE = toml(("gyro_range_deg_s = 200\n", "")), ("lower.csv",)
 # name of the mistake: campaign, what is done to it, words that must be said.
 MISTAKES: dict[str, tuple[str, tuple[Callable[[Path], None], ...], str]] = {
-    "all speeds inverted": ("arm", (change(SPEED, np.negative, *ALL),), r"every train record.*sign looks inverted"),
     "one speed inverted": ("arm", (change(SPEED, np.negative, "raise.csv"),), r"raise\.csv.*sign looks inverted"),
     "held-out inverted": ("arm", (change(SPEED, np.negative, ALL[5]),), r"raise_empty\.csv.*sign looks inverted"),
     "only speed inverted": ("one", (change(SPEED, np.negative, *ONE),), "sign looks inverted"),
-    "rad under deg": ("arm", (change(SPEED, np.deg2rad, *ALL),), "every train record.*radians under a header in deg"),
-    "rad under deg once": ("arm", (change(SPEED, np.deg2rad, *ONE),), r"lower\.csv.*radians under a header in deg"),
-    "rad under deg alone": ("one", (change(SPEED, np.deg2rad, *ONE),), "radians under a header in degrees"),
-    "rad under deg held out": ("arm", (change(SPEED, np.deg2rad, ALL[4]),), r"lower_low_voltage\.csv.*radians under"),
-    "deg under rad": ("arm", (NO_RANGE, header("deg_s", "rad_s", *ALL)), "every train.*degrees under a header in rad"),
     "deg under rad once": ("arm", (NO_RANGE, header("deg_s", "rad_s", "short.csv")), r"short\.csv.*degrees under"),
-    "tenfold": ("arm", (NO_RANGE, change(SPEED, lambda x: 10 * x, "raise.csv")), r"raise\.csv.*10 times too large"),
     "rpm under deg/s": ("arm", (change(SPEED, lambda x: x / 6, *ALL),), "revolutions per minute"),
     "gain of two": ("one", (NO_RANGE, change(SPEED, lambda x: 2 * x, *ONE)), "twice as large"),
     "lower and raise": ("arm", (exchange(*TRAIN[:2]),), r"(lower|raise)\.csv.*look exchanged"),
-    "short and lower": ("arm", (exchange("short.csv", "lower.csv"),), "look exchanged"),
-    "short and raise": ("arm", (exchange("short.csv", "raise.csv"),), "look exchanged"),
-    "held-out exchanged": ("arm", (exchange(*ALL[4:]),), r"(lower_low_voltage|raise_empty)\.csv"),
     "ms": ("arm", (change("time_s", lambda t: 1000 * t, *ALL),), "looks like milliseconds"),
-    "ms once": ("arm", (change("time_s", lambda t: 1000 * t, "short.csv"),), r"short\.csv.*looks like milliseconds"),
-    "ms alone": ("one", (WINDOW, change("time_s", lambda t: 1000 * t, *ONE)), "looks like milliseconds"),
-    "ten times too long": ("arm", (change("time_s", lambda t: 10 * t, *ALL),), "looks ten times too long"),
     "once too long": ("arm", (change("time_s", lambda t: 10 * t, "raise.csv"),), r"raise\.csv.*ten times too long"),
     "ten times too short": ("arm", (change("time_s", lambda t: t / 10, *ALL),), "looks ten times too short"),
     "noise": ("arm", (noise("raise.csv"),), r"raise\.csv: the measured angular_velocity is noise"),
     "noise alone": ("one", (noise(*ONE),), "the measured angular_velocity is noise"),
-    "noise held out": ("arm", (noise("raise_empty.csv"),), r"raise_empty\.csv: the measured angular_velocity is noise"),
     "late": ("arm", (late(0.15, *ALL),), "clock looks 0.1[45].* s late"),
-    "late, at two rates": ("arm", (sparse("raise.csv"), late(0.15, *ALL)), "clock looks 0.1[45].* s late"),
     "late once": ("arm", (late(0.1, "raise.csv"),), r"raise\.csv.*clock looks 0\.(09|10|1).* late"),
     "late alone": ("one", (late(0.15, *ONE),), "clock looks .* late"),
-    "early": ("arm", (late(-0.15, "raise.csv"),), r"raise\.csv.*(early|not at rest)"),
-    "empty for loaded": ("arm", (toml(("shell = true", "shell = false")),), r"lower\.csv.*shell looks wrong"),
     "start is target": (
         "arm", (toml(("-8.0", "-99"), ("start_angle_deg = -48.0\ntarget_angle_deg = -99",
                                       "start_angle_deg = -8.0\ntarget_angle_deg = -48.0")),), r"short\.csv.*exchanged"),
-    "angles in rad": ("arm", (radians(".*_angle"),), "every train.*start_angle_deg and target.* look given in radians"),
-    "angle in rad once": ("arm", (radians("start_angle", 1),), r"lower\.csv: start_angle_deg looks given in radians"),
-    "angles in rad alone": ("one", (radians(".*_angle"),), "start_angle_deg and target_angle_deg look given in rad"),
+    "angles in rad": ("arm", (angles_in_radians,), "every train.*start_angle_deg and target.* look given in radians"),
     "moving before the start": ("one", (late(-0.5, *ONE),), "not at rest before t = 0"),
     "same record held out": ("arm", (copied("raise.csv", "again.csv", "holdout"),), "raise.*again.*same 301 samples"),
-    "overlap": ("arm", (copied("raise.csv", "part.csv", "train", end=0.4),), r"raise.*part.*same 101 samples"),
     "g < 0": ("arm", (constant("g = -9.81"),), "'g' is -9.81 m/s2, a value from 0 to 30"),
-    "efficiency of 5": ("arm", (constant("eta1 = 5.0"),), "'eta1' is 5 1, a value from 0 to 1"),
-    "percent": ("arm", (constant("eta2 = 97.0"),), "'eta2' is 97"),
-    "mm": ("arm", (constant("L_loaded = 580.0"),), "'L_loaded' is 580 m"),
-    "grams": ("arm", (constant("m_loaded = 118000.0"),), "'m_loaded' is 118000 kg"),
-    "deg for rad": ("arm", (constant("alpha = 5.0"),), "'alpha' is 5 rad"),
-    "litres": ("arm", (constant("V0 = 0.4"),), "'V0' is 0.4 m3"),
     "milliohm": ("arm", (constant("R = 400.0"),), "'R' is 400 ohm"),
     "MPa": ("arm", (bounds("p0 = { low = 2.6, high = 3.5 }"),), "p0: 2.6 to 3.5 is far outside the declared range"),
-    "MPa, fixed": ("arm", (bounds("p0 = { fixed = 3.05 }"),), "p0: 3.05 is far outside"),
-    "percent, bounds": ("arm", (bounds("eta3 = { low = 45, high = 70 }"),), "eta3: 45 to 70 is far outside"),
     "drive inverted": ("axis", (change("drive_N_m", np.negative, *AXIS),), "'u'.*sign looks inverted"),
     "drive inverted once": ("axis", (change("drive_N_m", np.negative, "fast.csv"),),
                             r"fast\.csv.*'u'.*sign.*disagree: one of the two is wrong"),
     "drive in mN m": ("axis", (change("drive_N_m", lambda u: 1000 * u, *AXIS),), "'u'.*1,000 times too large"),
-    "axis: speed inverted": ("axis", (change(SPEED, np.negative, *AXIS),), "angle_deg moves -1 times"),
-    "axis: rad under deg": ("axis", (change(SPEED, np.deg2rad, *AXIS),), r"angle_deg moves 57\.\d times"),
     "axis: angle in rad": ("axis", (change("angle_deg", np.deg2rad, "slow.csv"),), r"slow.*moves 0\.017\d times"),
-    "axis: ms": ("axis", (change("time_s", lambda t: 1000 * t, *AXIS),), "every train record: time_s looks like milli"),
-    "axis: drive late": ("axis", (change("drive_N_m", lambda u: np.roll(u, -30), "fast.csv"),), r"fast\.csv.*late"),
-    "drives exchanged": ("axis", (exchange_column("drive_N_m", *AXIS[:2]),), r"slow\.csv.*fast\.csv look exchanged"),
     "drives exchanged, friction": (
         "rubbing", (exchange_column("drive_N_m", *AXIS[:2]),), r"slow\.csv.*fast\.csv look exchanged"),
-    "axis: held out": ("axis", (change("drive_N_m", np.negative, "other.csv"),), r"other\.csv.*'u'.*sign"),
 }  # fmt: skip
 
 
@@ -283,13 +242,7 @@ def test_a_clock_is_moved_by_a_time_and_not_by_samples(campaign):
     assert moved(records[1], 5.0).pieces[0] is records[1].pieces[0]
 
 
-# Those that take longest, each like one of the others.
-LONG = {
-    "all speeds inverted", "axis: ms", "rpm under deg/s", "rad under deg", "rad under deg once", "deg under rad",
-    "deg under rad once", "tenfold", "ms once", "short and raise", "short and lower", "drive in mN m",
-    "percent, bounds", "axis: rad under deg", "late, at two rates", "axis: speed inverted", "MPa, fixed", "early",
-    "ten times too long",
-}  # fmt: skip
+LONG = ("rpm under deg/s", "deg under rad once", "drive in mN m")
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n in LONG else n for n in MISTAKES])
@@ -304,11 +257,9 @@ def test_a_mistake_is_noticed_and_named(name, campaign):
 
 # Right campaigns: effects that the declared model lacks, larger than usual, other sensors, few records, real noise.
 LACKING = (
-    "coulomb=80", "stribeck=80 coulomb=40", "viscous=30", "drag=30", "seal_friction=400", "asymmetric_friction=80",
-    "torque_offset=30", "tilt_deg=5", "worm_loss=0.8 worm_width=0.05", "worm_speed=0.15 worm_fade=0.3",
-    "flux_saturation=80", "brush_drop=2",
-    "winding_heating=5e-5", "supply_sag=0.015", "gas_heat_loss=1", "line_loss=3e4", "tachometer_lag=0.01",
-    "tachometer_offset_deg_s=3", "controller_delay=0.01", "gyro_bandwidth_hz=30 gyro_bias_deg_s=3", "rocking_hz=5",
+    "coulomb=80", "viscous=30", "asymmetric_friction=80", "tilt_deg=5", "worm_loss=0.8 worm_width=0.05",
+    "flux_saturation=80", "brush_drop=2", "supply_sag=0.015", "gas_heat_loss=1", "tachometer_lag=0.01",
+    "controller_delay=0.01", "gyro_bandwidth_hz=30 gyro_bias_deg_s=3", "rocking_hz=5",
     "coulomb=80 supply_sag=0.015 tilt_deg=3 viscous=20",
 )  # fmt: skip
 SENSORS = ("--noise-deg-s 5", "--noise-bandwidth-hz 40 --noise-deg-s 1", "--quantisation-deg-s 2", "--rest 1.0",
@@ -316,7 +267,7 @@ SENSORS = ("--noise-deg-s 5", "--noise-bandwidth-hz 40 --noise-deg-s 1", "--quan
            "--noise-deg-s 0 --quantisation-deg-s 0")  # fmt: skip
 # Few records, of which no majority says which are right.
 PAIRS = ("lower,raise", "raise,short", "lower,empty,raise_empty")
-COMMITTED = ("four_strokes", "one_stroke", "paper_arm", "rocking_shell", "table2", "table1_stand/row_5")
+COMMITTED = ("four_strokes", "one_stroke", "rocking_shell", "table1_stand/row_5")
 
 
 @pytest.mark.slow
@@ -326,11 +277,11 @@ def test_right_campaigns_are_not_accused(root, stand, tmp_path):
     options += [("--repeats", "1", "--holdout", "", "--seed", str(4100 + i), "--manoeuvres", PAIRS[i % len(PAIRS)],
                  "--effect", *effects.split()) for i, effects in enumerate(LACKING[::3])]  # fmt: skip
     folders = [stand(*words) for words in options] + [root / "studies" / "campaigns" / name for name in COMMITTED]
-    folders += [pendulum(tmp_path / f"p{i}", i, friction) for i, friction in enumerate((0.0, 0.01, 0.03, 0.06, 0.1))]
+    folders += [pendulum(tmp_path / f"p{i}", i, friction) for i, friction in enumerate((0.0, 0.03, 0.1))]
     shutil.copytree(root / "studies" / "campaigns" / "paper_arm", tmp_path / "arm")
     folders += [halves(pendulum(tmp_path / "parts"), ("window_s = [0, 1.5]", "window_s = [1.6, 3]")),
                 halves(tmp_path / "arm", ("window_s = [0, 0.5]", "window_s = [0.6, 1]"))]  # fmt: skip
-    assert len(folders) >= 40
+    assert len(folders) >= 35
     accused = {str(f): said for f in folders if (said := accusations(said_of(f)))}
     assert not accused, accused
 

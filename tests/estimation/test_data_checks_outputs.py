@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 from made_machines import write_arm, write_axis, write_link
-from test_data_checks import accusations, change, header, pendulum, rewritten, said_of
+from test_data_checks import accusations, change, pendulum, rewritten, said_of
 
 from armid.estimation.data_checks import data_issues
 from armid.model import PLANTS, Model
@@ -53,76 +53,48 @@ def drives_exchanged(folder):
         write_table(folder / file, mixed)
 
 
-def without_speed(folder):
-    rewritten(lambda columns: {name: values for name, values in columns.items() if name != SPEED}, "b.csv")(folder)
-
-
 # name: campaign, what is done to it, words of which the first sentence about the train records must hold one.
 MISTAKES = {
     "angle inverted": (write_arm, (everywhere(ANGLE, np.negative),), r"every.*rad signal: its sign"),
-    "angle inverted once": (write_arm, (change(ANGLE, np.negative, "b.csv"),), r"b\.csv.*rad signal: its sign"),
     "angle in rad": (write_arm, (everywhere(ANGLE, np.deg2rad),), "every.*radians under a header in deg"),
-    "angle in deg": (write_arm, (header(ANGLE, "angle_rad", *FILES),), "every.*degrees under a header in rad"),
     "held out": (write_arm, (change(ANGLE, np.negative, "c.csv"),), r"c\.csv:.*measured rad signal: its sign"),
     "drive inverted": (write_arm, (everywhere(DRIVE, np.negative),), "every.*input 'u': its sign"),
-    "ms": (write_arm, (everywhere("time_s", lambda t: 1000.0 * t),), "every.*milliseconds"),
     "noise": (write_arm, (change(ANGLE, noise, "b.csv"),), r"b\.csv: the measured angle is noise"),
     "horizontal": (write_arm, (everywhere(ANGLE, lambda x: x + 90.0),), "every.*from elsewhere: with -90"),
     "speed inverted": (speed, (everywhere(SPEED, np.negative),), r"every.*rad/s signal: its sign"),
     "of two, speed inverted": (both, (everywhere(SPEED, np.negative),), r"every.*velocity \[rad/s\]: its sign"),
-    "of two, speed inverted once": (both, (change(SPEED, np.negative, "b.csv"),), r"b\.csv.*velocity.*: its sign"),
     "of two, angle inverted": (both, (everywhere(ANGLE, np.negative),), r"every.*angle \[rad\]: its sign"),
-    "of two, angle in rad": (both, (everywhere(ANGLE, np.deg2rad),), r"every.*angle \[rad\]: 57\.3"),
-    "of two, speed in rad": (both, (everywhere(SPEED, np.deg2rad),), r"every.*velocity \[rad/s\]: 57\.3"),
-    "of two, one without": (both, (everywhere(SPEED, np.negative), without_speed), "every.*velocity.*: its sign"),
     "of two, both": (both, (everywhere(ANGLE, np.negative), everywhere(SPEED, np.negative)), "every.*'u': its sign"),
     "upright": (pendulum, (change(ANGLE, lambda x: x + 180.0, *PENDULUM),), "every.*from elsewhere: with 180"),
     "mm": (write_axis, (everywhere("velocity_m_s", lambda v: 1000.0 * v),), r"a\.csv: position_m moves 0\.001 times"),
-    "axis inverted": (bare, (everywhere("velocity_m_s", np.negative),), "every.*m/s signal: its sign"),
     "hub inverted": (write_link, (everywhere(HUB, np.negative),), r"every.*hub_angle \[rad\]: its sign"),
-    "hub in rad": (write_link, (everywhere(HUB, np.deg2rad),), r"every.*hub_angle \[rad\]: 57\.3"),
-    "deflection inverted": (write_link, (everywhere(TWIST, np.negative),), r"every.*deflection \[rad\]: its sign"),
     "deflection inverted once": (write_link, (change(TWIST, np.negative, "b.csv"),), r"b\.csv.*deflection.*: its sign"),
-    "deflection held out": (write_link, (change(TWIST, np.negative, "c.csv"),), r"c\.csv.*deflection.*: its sign"),
     "thousandths": (write_link, (everywhere(TWIST, lambda x: 1000.0 * x),), "every.*1,000 times too (large|small)"),
     "link driven inverted": (write_link, (everywhere(DRIVE, np.negative),), "every.*'u': its sign"),
     "exchanged": (write_link, (together(lambda hub, twist: (twist, hub)),), "hub_angle and deflection look exchanged"),
     "absolute": (write_link, (together(lambda hub, twist: (hub, hub + twist)),), "deflection looks counted from"),
     "deflection is noise": (write_link, (change(TWIST, noise, "b.csv"),), r"b\.csv: the measured deflection is noise"),
     "drive late": (write_link, (change(DRIVE, later, "a.csv"),), r"a\.csv: its clock looks 0\.(09|1)\d* s early"),
-    "drive late once": (bare, (change("drive_N", partial(later, n=25), "b.csv"),), r"b\.csv: its clock looks 0\.[01]"),
-    "ms once": (write_arm, (clock(1000, "a.csv"),), r"a\.csv: time_s looks like milli"),
     "of two, ms once": (both, (clock(1000, "b.csv"),), r"b\.csv: time_s looks like milli"),
     "ten times once": (write_arm, (clock(10, "b.csv"),), r"b\.csv: time_s looks ten times too"),
-    "link, ten times once": (
-        write_link, (clock(10, "a.csv"),), r"(^|[: ])a\.csv: time_s looks ten times too long"),
     "drives exchanged": (write_arm, (drives_exchanged,), r"a\.csv: it and b\.csv look exchanged: each with the inputs"),
-    "drives exchanged, axis": (bare, (drives_exchanged,), r"a\.csv: it and b\.csv look exchanged"),
     "drives exchanged, link": (write_link, (drives_exchanged,), r"a\.csv: it and b\.csv look exchanged"),
     "deflection in rad": (
         write_link, (everywhere(TWIST, np.deg2rad),), r"every.*deflection \[rad\]: 57\.3 times too small"),
-    "deflection in rad once": (
-        write_link, (change(TWIST, np.deg2rad, "b.csv"),), r"b\.csv: the measured deflection \[rad\]: 57\.3 times too"),
-    "link ms": (write_link, (everywhere("time_s", lambda t: 1000.0 * t),), "every.*milliseconds"),
 }  # fmt: skip
 RIGHT = {
-    **{f"arm {c}": partial(write_arm, friction=c) for c in (0.0, 0.02, 0.05, 0.1, 0.2)},
-    **{f"arm of two {c}": partial(both, friction=c) for c in (0.0, 0.05, 0.15)},
-    **{f"arm by its speed {c}": partial(speed, friction=c) for c in (0.0, 0.1)},
-    "arm, noise": partial(write_arm, noise=20.0), "arm, short stroke": partial(write_arm, size=0.15),
+    **{f"arm {c}": partial(write_arm, friction=c) for c in (0.0, 0.05, 0.2)},
+    **{f"arm of two {c}": partial(both, friction=c) for c in (0.0, 0.15)},
+    "arm by its speed": partial(speed, friction=0.1), "arm, noise": partial(write_arm, noise=20.0),
     # over the top four times, where next to nothing decides
     **{f"arm, long stroke, {step} s": partial(write_arm, size=1.5, friction=0.05, interval=step) for step in
-       (0.005, 0.008, 0.01)},
-    "arm, coarse": partial(write_arm, interval=0.02),
-    **{f"axis {c}": partial(write_axis, friction=c) for c in (0.0, 0.5, 1.0, 1.5)},
-    "axis, noise": partial(write_axis, noise=20.0), "axis, bare": partial(bare, friction=0.7),
-    **{f"link {c}": partial(write_link, friction=c) for c in (0.0, 0.1, 0.3, 0.5)},
-    "link, noise": partial(write_link, noise=10.0),
-    "link by speeds": partial(write_link, outputs=("hub_speed", "deflection_speed"), friction=0.1),
+       (0.005, 0.01)},
+    **{f"axis {c}": partial(write_axis, friction=c) for c in (0.0, 1.0)},
+    "axis, bare": partial(bare, friction=0.7),
+    **{f"link {c}": partial(write_link, friction=c) for c in (0.0, 0.3)},
     "link, all": partial(write_link, outputs=("hub_angle", "hub_speed", "deflection", "deflection_speed"), noise=2.0),
-    "link, hub alone": partial(write_link, outputs=("hub_angle",), friction=0.1),
 }  # fmt: skip
-QUICK = ("of two, speed inverted", "deflection inverted once")
+QUICK = ("of two, speed inverted",)
 
 
 @pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in MISTAKES])

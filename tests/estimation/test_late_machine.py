@@ -58,39 +58,18 @@ def test_the_estimate_comes_from_anywhere_in_the_range_without_continuation(fitt
         assert np.all(np.abs(refine(ready, space, np.array([x[0], x[1], delay])) - x) <= 0.02 * sd)
 
 
-def test_the_slopes_of_least_squares_are_those_of_the_exact_solution(fitted):
-    space, ready, _ = fitted
-    records = weighted_records(ready, space, [1.0] * len(ready))
-    _, slopes = records.residual_and_slopes(records.shares(np.array([DRUM, FRICTION, DELAY])))
-    volts = [replay.pieces[0].manoeuvre.inputs["volts"] for replay in ready]
-    h = 1e-7
-    exact = [(exact_speed(u, DELAY + h) - exact_speed(u, DELAY - h)) / (2 * h) * records.span[2] for u in volts]
-    assert np.abs(slopes[:, 2] - np.concatenate(exact)).max() <= 1e-3 * np.abs(exact).max()
-
-
-def test_chi2_has_no_step_in_the_delay(fitted):
-    """It bends at whole numbers of samples, where a held input jumps at another sample, and nowhere steps."""
-    space, ready, x = fitted
-    records = weighted_records(ready, space)
-    for whole in (0.0, 2.0, 3.0):
-        delays = INTERVAL * (whole + np.linspace(0.0 if whole == 0.0 else -1e-3, 1e-3, 201))
-        chi2 = records.chi2(np.array([records.shares(np.array([x[0], x[1], d])) for d in delays]))
-        steps = np.diff(chi2)
-        assert np.abs(np.diff(steps)).max() <= 0.1 * np.abs(steps).max()
-
-
 def test_intervals_hold_the_truth(fitted):
-    """Of 24 noises a 95 % interval misses 5 or more with a chance of 1 %; the mean is off by less than the noise."""
+    """Of 16 noises a 95 % interval misses 4 or more with a chance of 1 %; the mean is off by less than the noise."""
     space, ready, _ = fitted
     truth = space.complete(np.array([[DRUM, FRICTION, DELAY]]))
     signals, rng, found = [r.signal(truth)[0] for r in ready], np.random.default_rng(8), []
-    for _ in range(24):
+    for _ in range(16):
         pairs = zip(ready, signals, strict=True)
         noisy = tuple(r.measuring(s + NOISE * rng.standard_normal(len(s))) for r, s in pairs)
         x = refine(noisy, space, np.array([DRUM, FRICTION, 0.012]))
         found.append((x[2] - DELAY) / information_at(noisy, space, x).deviation[2])
-    assert np.sum(np.abs(found) > 1.96) <= 4
-    assert abs(np.mean(found)) <= 3.0 / np.sqrt(24)
+    assert np.sum(np.abs(found) > 1.96) <= 3
+    assert abs(np.mean(found)) <= 3.0 / np.sqrt(16)
 
 
 def test_a_dead_time_is_no_lag_and_a_lag_no_dead_time(fitted):

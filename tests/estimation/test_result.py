@@ -15,8 +15,7 @@ from armid.estimation.identify_document import answer, details_of, identify_docu
 from armid.identifiers import IDENTIFIERS
 from armid.problem.fitness import FITNESS
 from armid.problem.space import space_of
-from armid.record import read_campaign, write_table
-from armid.record.table import read_table
+from armid.record import read_campaign
 from armid.report.style import DPI, save
 from armid.report.terminal import show
 from changed_records import noisy
@@ -119,17 +118,13 @@ def test_a_fit_that_does_not_carry_over_is_told(lowering_found):
         assert any("does not carry over" in text for text in remarks(found)) == told
 
 
-@pytest.mark.parametrize(
-    ("key", "shift", "noticed"), [("28.0", 0.0, False), ("30.0", 0.0, True), ("28.0", 0.002, True)]
-)
-def test_a_residual_of_little_more_than_noise_is_told(stand, tmp_path, key, shift, noticed):
-    """A supply told as 30 V in place of 28, or a clock 2 ms late, moves parameters at a chi2 of less than 2."""
+@pytest.mark.parametrize(("key", "noticed"), [("28.0", False), ("30.0", True)])
+def test_a_residual_of_little_more_than_noise_is_told(stand, tmp_path, key, noticed):
+    """A supply told as 30 V in place of 28 moves parameters at a chi2 of less than 2."""
     folder = tmp_path / "one"
     shutil.copytree(stand("--manoeuvres", "lower", "--holdout", "", "--repeats", "1", "--window-s", "0", "0.7"), folder)
     toml = folder / "campaign.toml"
     toml.write_text(toml.read_text().replace("supply_V = 28.0", f"supply_V = {key}"))
-    columns = dict(read_table(folder / "lower.csv", "lower.csv").columns)
-    write_table(folder / "lower.csv", columns | {"time_s": np.round(columns["time_s"] + shift, 6)})
     read = read_campaign(folder)
     model = read.model()
     found = identify(read, model, space_of(model), FITNESS["rmse"], IDENTIFIERS["least_squares"])
@@ -147,18 +142,12 @@ def saved(figure, path):
     return (image.shape[1] / DPI, image.shape[0] / DPI), float(np.mean(image.min(axis=2) < 0.9))
 
 
-@pytest.mark.parametrize(("n_train", "with_holdout", "inches"), [
-    (1, False, (6.8, 5.5)), (1, True, (13.6, 5.5)), (2, True, (13.6, 9.9)),
-])  # fmt: skip
-def test_one_pair_of_axes_for_each_record(lowering_found, tmp_path, n_train, with_holdout, inches):
-    replays = {"train_replays": lowering_found.train_replays * n_train,
-               "holdout_replays": lowering_found.holdout_replays * with_holdout}  # fmt: skip
-    size, ink = saved(fit_figure(replace(lowering_found, **replays)), tmp_path / "fit.png")
-    assert size == pytest.approx(inches, abs=0.01)
-    assert ink > 0.01
-
-
-def test_of_many_records_eight_are_drawn_of_both_roles_where_there_are_both(lowering_found, tmp_path):
+def test_of_many_records_eight_are_drawn_of_both_roles_where_there_are_both(found, lowering, lowering_found, tmp_path):
+    for one in (lowering_found, found(lowering, fitness="rmse")):
+        size, ink = saved(convergence_figure(one), tmp_path / "convergence.png")
+        assert (size, ink > 0.005) == (pytest.approx((6.8, 4.2), abs=0.01), True)
+    size, ink = saved(fit_figure(lowering_found), tmp_path / "fit.png")
+    assert (size, ink > 0.01) == (pytest.approx((13.6, 5.5), abs=0.01), True)
     for n_train, n_holdout, drawn in ((9, 0, (8, 0)), (8, 1, (7, 1)), (2, 9, (2, 6)), (10, 4, (4, 4))):
         several = replace(
             lowering_found, train_replays=lowering_found.train_replays * n_train,
@@ -169,13 +158,6 @@ def test_of_many_records_eight_are_drawn_of_both_roles_where_there_are_both(lowe
         assert roles == sorted(roles, reverse=True)
     size, _ = saved(fit_figure(several), tmp_path / "fit.png")
     assert size == pytest.approx((13.6, 18.7), abs=0.01)
-
-
-@pytest.mark.parametrize("fitness", ["similarity", "rmse", "likelihood"])
-def test_convergence(found, lowering, tmp_path, fitness):
-    size, ink = saved(convergence_figure(found(lowering, fitness=fitness)), tmp_path / "convergence.png")
-    assert size == pytest.approx((6.8, 4.2), abs=0.01)
-    assert ink > 0.005
 
 
 def test_ellipses_of_the_most_correlated_pairs_with_the_truth(lowering_found):

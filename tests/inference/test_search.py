@@ -19,34 +19,38 @@ from armid.model import EFFECTS, Model
 from armid.record import read_campaign
 
 MANOEUVRES = ("--manoeuvres", "lower,raise,short,empty", "--holdout", "", "--repeats", "1", "--duration", "1.0")
-SHAPES = {
-    "shell_rocking": (("rocking_hz=6", "rocking_stop=0.008"), "hardening", 0.0077, 0.001),
-    "stribeck": (("stribeck=60", "stribeck_exponent=1"), "exponent", 1.0, 0.15),
-    "controller_delay": (("controller_period=0.012",), "period", 0.012, 0.0015),
-    "winding_heating": (("winding_heating=5e-5", "winding_cooling=2.5"), "cooling", 2.5, 0.4),
-}
+# Candidates of one compiled model, of which a test asks for some.
+FEW = ("coulomb", "flux_saturation", "stribeck", "supply_sag")
+
+
+@pytest.fixture
+def explored(stand, monkeypatch):
+    """Return a function that infers of some candidates what a campaign with some effects lacks, and how it explored."""
+    joinable = Library.joinable
+
+    def run(candidates, *effects):
+        campaign = read_campaign(stand(*MANOEUVRES, "--effect", *effects))
+        some = Model(campaign.plant), campaign, {n: EFFECTS[n] for n in FEW}
+        monkeypatch.setattr(Library, "joinable", lambda *of: [k for k in joinable(*of) if k.public in candidates])
+        return infer(*prepared(*some))
+
+    return run
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", SHAPES)
-def test_a_shape_that_is_not_the_usual_one_is_found(stand, name, monkeypatch):
-    """Each with itself as the only candidate, in the compiled model of all four."""
-    effect, shape, expected, within = SHAPES[name]
-    campaign = read_campaign(stand(*MANOEUVRES, "--effect", *effect))
-    monkeypatch.setattr(Library, "joinable", lambda _, active: [] if active else [EffectKey(name)])
-    found = infer(*prepared(Model(campaign.plant), campaign, {n: EFFECTS[n] for n in SHAPES})).exploration
+def test_a_shape_that_is_not_the_usual_one_is_found(explored):
+    found = explored(["stribeck"], "stribeck=60", "stribeck_exponent=1").exploration
     best, _ = found.ranked()[0]
-    assert {h.public for h in best} == {("effect", name)}
+    assert {h.public for h in best} == {("effect", "stribeck")}
     fit = found.fits[best]
-    assert fit.active == (EffectKey(name, free_shape=True),)
-    assert fit.values[f"{name}.{shape}"] == pytest.approx(expected, abs=within)
+    assert fit.active == (EffectKey("stribeck", free_shape=True),)
+    assert fit.values["stribeck.exponent"] == pytest.approx(1.0, abs=0.15)
 
 
 @pytest.mark.slow
-def test_another_form_of_an_effect_takes_its_place(stand):
+def test_another_form_of_an_effect_takes_its_place(explored):
     """As the square of the current, what saturates otherwise looks like another effect; its own form is asked for."""
-    campaign = read_campaign(stand(*MANOEUVRES, "--effect", "flux_saturation=90", "coulomb=40"))
-    found = infer(*prepared(Model(campaign.plant), campaign, {n: EFFECTS[n] for n in ("flux_saturation", "coulomb")}))
+    found = explored(["flux_saturation", "coulomb"], "flux_saturation=90", "coulomb=40")
     best = {h.name: h.form for h in found.exploration.ranked()[0][0]}
     assert best == {"coulomb": "", "flux_saturation": ""}
     assert "arctangent" in {h.form for model in found.exploration.fits for h in model if len(model) == 2}
@@ -54,10 +58,9 @@ def test_another_form_of_an_effect_takes_its_place(stand):
 
 
 @pytest.mark.slow
-def test_a_fault_that_an_effect_makes_needless_is_dropped(stand, monkeypatch):
+def test_a_fault_that_an_effect_makes_needless_is_dropped(explored, monkeypatch):
     """It took the place of the effect and keeps it with no size: a sound record would be accused."""
-    campaign = replace(read_campaign(stand(*MANOEUVRES, "--effect", "supply_sag=0.03")), tolerances={})
-    found = infer(*prepared(Model(campaign.plant), campaign, {"supply_sag": EFFECTS["supply_sag"]})).exploration
+    found = explored(["supply_sag"], "supply_sag=0.03").exploration
     best, _ = found.ranked()[0]
     assert {h.public for h in best} == {("effect", "supply_sag")}
     right = found.fits.pop(best)
@@ -76,11 +79,9 @@ def test_a_fault_that_an_effect_makes_needless_is_dropped(stand, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_model_that_missed_its_valley_is_fitted_again_from_the_larger_one(stand):
+def test_a_model_that_missed_its_valley_is_fitted_again_from_the_larger_one(explored):
     """Else a second name, of no size, would seem as necessary as the first."""
-    campaign = replace(read_campaign(stand(*MANOEUVRES, "--effect", "coulomb=40")), tolerances={})
-    candidates = {n: EFFECTS[n] for n in ("coulomb", "supply_sag")}
-    found = infer(*prepared(Model(campaign.plant), campaign, candidates)).exploration
+    found = explored(["coulomb", "supply_sag"], "coulomb=40").exploration
     right, _ = found.ranked()[0]
     assert {h.public for h in right} == {("effect", "coulomb")}
     fit = found.fits[right]
@@ -189,3 +190,13 @@ def test_the_evidence_of_a_fit_is_its_own_and_not_that_of_one_that_is_gone(monke
         found.fits[key] = Leaves(float(chi2))
         told.append(found.log_posterior(key, "a scale"))
     assert told == [-0.5 * chi2 for chi2 in range(20)]
+
+
+def test_keys_and_what_they_own():
+    key = EffectKey("flux_saturation", "atan", free_shape=True)
+    assert (key.compiled, key.public, key.declared) == (
+        "flux_saturation_atan", "flux_saturation", EffectKey("flux_saturation", "atan"),
+    )  # fmt: skip
+    assert key.owns("flux_saturation_atan.level")
+    assert not key.owns("flux_saturation_atan2.level")
+    assert EffectKey("error_of_R").public == "constant:R"

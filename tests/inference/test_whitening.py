@@ -9,7 +9,8 @@ from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
 from armid.estimation.noise_model import coloured_level, white_level, yule_walker
-from armid.inference.checks import motion_phases, time_in_words
+from armid.inference.checks import motion_phases, spectra, square_along, time_in_words
+from armid.inference.model import decomposed
 from armid.inference.whitening import soundness
 from armid.model import Manoeuvre, Output
 from armid.record.record import made_record
@@ -96,3 +97,24 @@ def test_samples_behind_a_gap_are_unsound_as_far_as_the_filter_reaches(data):
     record = made_record("a.csv", "train", Manoeuvre(0.01, 20, {}), Output("speed", "v", "rad/s"), np.arange(20.0), 0.1)
     found = soundness(record.with_signals(lambda signal: replace(signal, data=told)), reach=1)
     np.testing.assert_array_equal(found, [1.0, 1.0, 0.0][: len(data)])
+
+
+@pytest.mark.parametrize("rank", [1, 3, 5])
+def test_the_part_along_columns_is_that_of_a_decomposition_whatever_their_rank(rank):
+    rng = np.random.default_rng(rank)
+    columns = rng.standard_normal((300, rank)) @ rng.standard_normal((rank, 5)) * np.logspace(-3, 3, 5)
+    values = rng.standard_normal(300)
+    basis, inverse = decomposed(columns)
+    square, found = square_along(columns, values)
+    assert found == rank == basis.shape[1]
+    assert square == pytest.approx(float(np.sum((basis.T @ values) ** 2)), rel=1e-9)
+    np.testing.assert_allclose(columns @ (inverse @ values), basis @ (basis.T @ values), atol=1e-8)
+
+
+def test_a_record_without_a_rest_adds_no_ordinate():
+    """Records in motion have none, while the rest of others shows coloured noise."""
+    record, level = SimpleNamespace(spacing=0.01), SimpleNamespace(rms=1.0)
+    seen = SimpleNamespace(data=SimpleNamespace(each=(record, record), levels=(level, level)))
+    rest = np.random.default_rng(1).normal(size=400)
+    alone = SimpleNamespace(data=SimpleNamespace(each=(record,), levels=(level,)))
+    assert spectra([rest, np.empty(0)], seen, []) == spectra([rest], alone, [])

@@ -7,11 +7,10 @@ from armid.model import EFFECTS
 # coulomb and seal_friction leave the very same trace
 CANDIDATES = {n: EFFECTS[n] for n in ("coulomb", "seal_friction", "supply_sag", "tilt", "viscous")}
 TRUTH = {"p0": 3.2e6, "k": 0.9, "eta3": 0.6, "n": 1.2}
-STROKES = (
-    "--repeats", "1", "--duration", "1.0",
+COMMON = (
+    "--p0", "3.2e6", "--k", "0.9", "--eta3", "0.6", "--n", "1.2", "--repeats", "1", "--duration", "1.0",
     "--manoeuvres", "lower,raise,short,empty,lower_low_voltage", "--holdout", "lower_low_voltage",
 )  # fmt: skip
-COMMON = ("--p0", "3.2e6", "--k", "0.9", "--eta3", "0.6", "--n", "1.2", *STROKES)
 
 
 def garbage(record, rng):

@@ -90,15 +90,11 @@ def test_the_variable_is_the_position_and_the_curve_is_the_spring(axis, whole):
     assert np.max(np.abs(best.heights - spring(knots))[1:]) < 0.25 * np.ptp(spring(knots))
 
 
-@pytest.fixture(scope="module")
-def unexplained(stand):
-    """A spring of an arm that engages beyond an angle, which no candidate is."""
-    campaign = read_campaign(stand(*COMMON, "--effect", "cable_spring=300"))
-    return close_loop(Model(campaign.plant), campaign, CANDIDATES)
-
-
 @pytest.mark.slow
-def test_what_no_candidate_is_has_no_name_and_its_signal_is_told(unexplained, tmp_path):
+def test_what_no_candidate_is_has_no_name_and_its_signal_is_told(stand, tmp_path):
+    """A spring of an arm that engages beyond an angle."""
+    campaign = read_campaign(stand(*COMMON, "--effect", "cable_spring=300"))
+    unexplained = close_loop(Model(campaign.plant), campaign, CANDIDATES)
     report = json.loads(json.dumps(report_of(unexplained), allow_nan=False))
     assert report["verdict"] in ("unexplained", "partly_explained")
     assert report["probabilities"]["unknown"] > 0.9
@@ -109,24 +105,11 @@ def test_what_no_candidate_is_has_no_name_and_its_signal_is_told(unexplained, tm
     told = " ".join(details_of(unexplained)["missing"])
     assert "theta" in told
     assert "at torque" in told
+    # what is trusted is true all the same, and what a cause takes of a width is a share of it
+    trusted = [e for e in unexplained.after.estimates if e.name in TRUTH and e.trusted]
+    assert [e.name for e in trusted if not e.low <= TRUTH[e.name] <= e.high] == []
+    causes = [c for e in unexplained.after.estimates for c in e.causes]
+    assert [c for c in causes if float(c.rpartition(", ")[2].removesuffix("%")) > 100.0] == []
     figures = figures_of(unexplained, report, details_of(unexplained))
     save(figures["missing"](), tmp_path / "missing.png")
     assert (tmp_path / "missing.png").stat().st_size > 10_000
-
-
-@pytest.mark.slow
-def test_what_is_trusted_beside_something_unknown_is_true(unexplained):
-    trusted = [e for e in unexplained.after.estimates if e.name in TRUTH and e.trusted]
-    assert [e.name for e in trusted if not e.low <= TRUTH[e.name] <= e.high] == []
-    # what a cause takes of a width is a share of it
-    causes = [c for e in unexplained.after.estimates for c in e.causes]
-    assert [c for c in causes if float(c.rpartition(", ")[2].removesuffix("%")) > 100.0] == []
-
-
-@pytest.mark.slow
-def test_without_a_curve_no_signal_is_sought(unexplained):
-    campaign = unexplained.campaign
-    found = close_loop(Model(campaign.plant), campaign, CANDIDATES, curve=False)
-    assert found.missing is None
-    assert found.parameters == unexplained.parameters
-    assert "missing" not in figures_of(found, report_of(found), details_of(found))

@@ -94,14 +94,6 @@ def test_a_sampled_control_switches_at_a_sample(delay, period, switch):
     assert control.still_to_wait(0.0, delay, period, 0.0, 0.1043) > 0.0
 
 
-def test_late_switch_keeps_the_full_voltage():
-    """While the switch waits the demand, after what the plant puts on top of the command, is that before the switch."""
-    K_p, theta_D, theta, damping, omega, feedback, U, u_th = 280.0, 0.4, 0.1, 70.0, 2.0, 0.1, 28.0, 0.5
-    seen = K_p, theta_D, theta, damping, omega, feedback
-    added = control.late_command(1.0, 0.0, *seen, 1.0, U, u_th, 0.01, 0.0, 0.0, 0.0)
-    assert K_p * (theta_D - theta) + added - damping * (omega + feedback) == pytest.approx(2 * (U + u_th))
-
-
 @pytest.mark.parametrize("given", [0.0002, 0.004])
 def test_a_lag_is_a_time_behind_a_steady_acceleration(given):
     """A filter that has settled is a tau behind, below and above the shortest time constant of its state."""

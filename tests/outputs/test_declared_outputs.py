@@ -55,7 +55,6 @@ def test_the_old_way_declares_one_output() -> None:
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"outputs": (), "output": ""}, "records nothing"),
         ({"output": "v"}, "one of them, or the first output 'recorded_speed' in rad/s"),
         ({"outputs": two_inertias.outputs[:1] * 2}, "each name once"),
         ({"outputs": (Output("a", "speeed", "rad/s"),), "output": ""}, "records 'speeed': did you mean"),

@@ -5,6 +5,7 @@ import pytest
 from two_inertias import NOISE_ANGLE, NOISE_SPEED, TRUTH, two_inertias, write_drive
 
 from armid.errors import ArmidError
+from armid.estimation.corrections import corrections
 from armid.estimation.examine import examine
 from armid.estimation.identify import identify
 from armid.estimation.identify_document import details_of, result_of
@@ -31,16 +32,13 @@ def ready(campaign):
     return replays(campaign.train, model, space_of(model))
 
 
-def test_outputs_of_a_file_share_their_simulation(ready) -> None:
+def test_the_start_is_fitted_and_leaves_noise(ready) -> None:
+    """Also the motor's state, which no output of the second record shows; outputs of a file share their simulation."""
     assert [r.name for r in ready] == ["a.csv, motor_speed", "a.csv, load_angle", "a.csv, deflection",
                                        "b.csv, load_angle"]  # fmt: skip
     assert ready[0].ready is ready[1].ready is ready[2].ready is not ready[3].ready
     for replay, signal in zip(ready, signals_of(ready, WHOLE[np.newaxis]), strict=True):
         np.testing.assert_array_equal(signal, replay.signal(WHOLE[np.newaxis]))
-
-
-def test_the_start_is_fitted_and_leaves_noise(ready) -> None:
-    """Also the motor's state, which no output of the second record shows."""
     started = with_starts(ready, WHOLE)
     for replay, noise in zip(started, (NOISE_SPEED, NOISE_ANGLE, NOISE_ANGLE, NOISE_ANGLE), strict=True):
         residual = replay.measured - replay.signal(WHOLE[np.newaxis])[0]
@@ -48,6 +46,11 @@ def test_the_start_is_fitted_and_leaves_noise(ready) -> None:
     found = started[3].pieces[0].manoeuvre.constants
     for name, truth in (("start_motor", 0.3), ("start_motor_speed", 2.0), ("start_load", 0.25)):
         assert found[name] == pytest.approx(truth, abs=0.03 if name != "start_motor_speed" else 0.3)
+    runaway = WHOLE * [1.0, 1.0, -60.0, 1.0]
+    assert not np.isfinite(ready[0].signal(runaway[np.newaxis])).all()
+    for before, after in zip(ready, with_starts(ready, runaway), strict=True):
+        assert after.pieces[0].correction is None
+        assert after.pieces[0].manoeuvre.constants == before.pieces[0].manoeuvre.constants
     # about there another candidate gets a start of its own: as good as if it were fitted about that one
     other = WHOLE * [1.01, 0.995, 1.005, 1.05]
     near = started[3].measured - started[3].signal(other[np.newaxis])[0]
@@ -55,6 +58,12 @@ def test_the_start_is_fitted_and_leaves_noise(ready) -> None:
     assert np.linalg.norm(near) == pytest.approx(
         np.linalg.norm(own.measured - own.signal(other[np.newaxis])[0]), rel=0.01
     )
+
+
+def test_what_two_signals_of_one_unit_may_have_been_mistaken_for(campaign) -> None:
+    told = {c.kind: c.words for c in corrections(campaign.plant, campaign.train[0], 10)}
+    assert "load_angle and deflection look exchanged" in told["exchanged"]
+    assert "deflection looks counted from the ground" in told["absolute"]
 
 
 def test_samples_that_are_no_data_tell_nothing_of_the_start(tmp_path) -> None:
@@ -91,14 +100,6 @@ def test_least_squares_finds_the_truth(campaign, fitness) -> None:
     assert list(result["error_by_record"]["b.csv"]["outputs"]) == ["load_angle"]
     assert result["error_by_record"]["b.csv"]["rmse"] is None
     assert len(details_of(found)["records"]) == 7
-
-
-def test_a_candidate_that_diverges_starts_where_the_record_says(ready) -> None:
-    runaway = WHOLE * [1.0, 1.0, -60.0, 1.0]
-    assert not np.isfinite(ready[0].signal(runaway[np.newaxis])).all()
-    for before, after in zip(ready, with_starts(ready, runaway), strict=True):
-        assert after.pieces[0].correction is None
-        assert after.pieces[0].manoeuvre.constants == before.pieces[0].manoeuvre.constants
 
 
 def test_a_fitness_names_an_output(ready) -> None:

@@ -42,52 +42,38 @@ def assert_says(message, fragments):
 CSV = {
     "missing speed": (csv("time_s,current_A"), ["campaign/lower.csv, line 1", "no speed column", "'current_A'",
                                                 "angular_velocity_deg_s"]),
-    "time alone": (csv("time_s", [r.split(",")[0] for r in ROWS]), ["lower.csv, line 1", "no speed column",
-                                                                      "angular_velocity_deg_s"]),
     "missing time": (csv("clock,angular_velocity_deg_s"), ["lower.csv, line 1", "no time column", "time_s"]),
     "unknown unit": (csv("time_s,angular_velocity_krpm"), ["lower.csv, line 1", "'angular_velocity_krpm'",
                                                            "unknown unit", "angular_velocity_rad_s"]),
     "counts of no encoder": (csv("time_s,angular_velocity_counts_s"), ["lower.csv, line 1", "counts_per_turn"]),
     "unknown unit of time": (csv("time_ms,angular_velocity_deg_s"), ["'time_ms'", "unknown unit", "time_s"]),
-    "two speeds": (csv(HEADER + ",velocity_m_s", [r + ",1" for r in ROWS]), ["line 1", "velocity_m_s", "exactly one"]),
     "duplicate header": (csv("time_s,angular_velocity_deg_s,time_s", [r + ",1" for r in ROWS]),
                          ["lower.csv, line 1", "'time_s'", "twice"]),
     "no header": (csv("0.0,0.0"), ["lower.csv, line 1", "numbers are there, and no header", "a line of names"]),
-    "unnamed column": (csv(HEADER + ",", [r + ",1" for r in ROWS]), ["line 1", "column 3", "name"]),
     "NaN in most rows": (csv(rows=[r if i % 3 else f"{r.split(',')[0]},nan" if i % 2 else f"{r.split(',')[0]},"
                                    for i, r in enumerate(ROWS)][:2] + [f"{r.split(',')[0]},nan" for r in ROWS[2:]]),
                          ["lower.csv", "angular_velocity_deg_s has no number in 62 of 63 rows, the first on line 2",
                           "at most half"]),
     "NaN in the times": (csv(line_7="nan,2.0"), ["lower.csv, line 7", "time_s has no number there", "1 of 63"]),
     "inf": (csv(line_9="inf,1.0"), ["lower.csv, line 9", "time_s is inf", "finite"]),
-    "NaN after empty lines": (csv(line_5="\n\nNaN,0.0"), ["lower.csv, line 7", "no number"]),
     "text": (csv(line_12="0.007,fast"), ["lower.csv, line 12", "angular_velocity_deg_s is 'fast'", "number"]),
-    "empty cell": (csv(line_12=",0.007"), ["lower.csv, line 12", "time_s has no number there"]),
-    "hexadecimal": (csv(line_12="0.007,0x1F"), ["lower.csv, line 12", "'0x1F'"]),
-    "overflow": (csv(line_12="0.007,1e999"), ["lower.csv, line 12", "angular_velocity_deg_s is inf"]),
     "huge": (csv(line_12="0.007,1e200"), ["lower.csv, line 12", "1e+200", "within +-1e+30"]),
-    "too many digits": (csv(line_12="0.007," + "9" * 5000), ["lower.csv, line 12", "is inf"]),
     "short row": (csv(line_20="0.015"), ["lower.csv, line 20", "1 values", "2 are expected as in the header"]),
     "long row": (csv(line_20="0.015,1,2"), ["lower.csv, line 20", "3 values", "2 are expected as in the header"]),
-    "all rows long": (csv(rows=[r + ",1" for r in ROWS]), ["lower.csv, line 2", "3 values", "2 are expected"]),
     "spaces": (csv().replace(",", " "), ["lower.csv, line 1", "'time_s angular_velocity_deg_s'", "commas"]),
     "a comma for both": (csv().replace(".", ","), ["lower.csv, line 2", "4 values in a row, 2 are expected",
                                                    'sep=";", decimal=","']),
     "time goes back": (csv(line_30="0.001,3.0"), ["lower.csv, line 30", "time_s 0.001", "after 0.024", "increasing"]),
     "time twice": (csv(line_30="0.024,3.0"), ["lower.csv, line 30", "time_s 0.024", "twice", "increasing"]),
     "few samples": (csv(rows=ROWS[:22]), ["lower.csv", "19 samples after t = 0", "at least 20"]),
-    "one sample": (csv(rows=ROWS[:1]), ["lower.csv", "0 samples after t = 0"]),
     "constant": (csv(rows=[f"{i / 1000},{np.sin(i) if i < 0 else 2.5}" for i in range(-60, 60)]),
                  ["lower.csv", "constant", "motion"]),
     "no samples": (csv(rows=[]), ["lower.csv", "no samples"]),
     "empty": ("", ["lower.csv, line 1", "empty", "header"]),
-    "blank": ("\n\n\n", ["lower.csv, line 1", "empty", "header"]),
     "not UTF-8": (csv().encode().replace(b"angular", b"\xe4ngular"), ["lower.csv, line 1", "UTF-8"]),
-    "not UTF-8 below": (csv(line_40="@").encode().replace(b"@", b"\xff\xfe\xff"), ["lower.csv", "UTF-8"]),
     "UTF-16 without a mark": (csv().encode("utf-16-le"), ["lower.csv, line 1", "readable name"]),
-    "binary": (bytes(range(256)) * 20, ["lower.csv, line 1"]),
-    "zeros": (b"\0" * 5000, ["lower.csv, line 1", "readable name"]),
     "a zip": (b"PK\x03\x04" + bytes(range(128)) * 20, ["lower.csv, line 1"]),
+    "binary": (bytes(range(256)) * 20, ["lower.csv, line 1"]),
 }  # fmt: skip
 
 
@@ -100,39 +86,26 @@ TOML = {
     "misspelt campaign key": ('efects = ["coulomb"]\n' + GOOD, ["campaign.toml", "'efects'", "did you mean 'effects'"]),
     "misspelt record key": (GOOD.replace("target_angle_deg", "target_angel_deg"),
                             ["campaign.toml, record 'lower.csv'", "'target_angel_deg'", "mean 'target_angle_deg'"]),
-    "misspelt shared record key": (GOOD + "windows_s = [0.0, 0.7]", ["'windows_s'", "did you mean 'window_s'"]),
-    "misspelt required key": (GOOD.replace("role =", "rol ="), ["'lower.csv'", "'rol'", "did you mean 'role'"]),
     "supply not said": (GOOD.replace("supply_V = 28.0", ""),
                         ["campaign/campaign.toml, record 'lower.csv'", "'supply_V' is missing", "U under [constants]"]),
-    "no word of the shell": (GOOD.replace("shell = true", ""), ["'shell' is missing", "true or false"]),
     "no stroke": (GOOD.replace("22.0", "-48.0"), ["target_angle_deg is -48", "a motion is expected"]),
     "fixed and bounded": (GOOD.replace("[[records]]", "[parameters.n]\nlow = 1.0\nfixed = 1.4\n[[records]]"),
                           ["campaign/campaign.toml, parameters.n", "'fixed' and a bound", "expected"]),
     "missing name": (GOOD.replace('name = "c00"', ""), ["campaign.toml", "'name'", "missing"]),
     "missing records": ('name = "a"\nplant = "driven_axis"', ["campaign.toml", "'records'", "missing", "[[records]]"]),
-    "no records": ('name = "a"\nplant = "driven_axis"\nrecords = []', ["'records'", "[]", "[[records]]"]),
     "one table for records": (GOOD.replace("[[records]]", "[records]"), ["'records'", "[[records]]"]),
-    "records of numbers": ('name = "a"\nplant = "driven_axis"\nrecords = [3]', ["'records.0'", "3"]),
     "missing file key": (GOOD.replace("file =", "# file ="), ["campaign.toml, record 1", "'file'", "missing"]),
-    "missing role": (GOOD.replace("role =", "# role ="), ["record 'lower.csv'", "'role'", "missing", "'train' or"]),
-    "role of a wrong kind": (GOOD.replace('"train"', "3"), ["record 'lower.csv'", "'role' is 3", "'holdout'"]),
     "unknown role": (GOOD.replace('"train"', '"test"'), ["'role' is 'test'", "'train' or 'holdout'"]),
     "no train record": (GOOD.replace('"train"', '"holdout"'), ["campaign.toml", "'train'", "at least one"]),
-    "missing start": (GOOD.replace("start_angle_deg", "# "), ["'start_angle_deg' is missing", "-55 to 45"]),
-    "text for a boolean": (GOOD.replace("shell = true", 'shell = "yes"'), ["'shell' is 'yes'", "true or false"]),
-    "number for a boolean": (GOOD.replace("shell = true", "shell = 1"), ["'shell' is 1", "true or false"]),
+    "no word of the shell": (GOOD.replace("shell = true", ""), ["'shell' is missing", "true or false"]),
+    "role of a wrong kind": (GOOD.replace('"train"', "3"), ["record 'lower.csv'", "'role' is 3", "'holdout'"]),
     "boolean for a number": (GOOD.replace("28.0", "true"), ["'supply_V' is true", "finite number"]),
+    "text for a boolean": (GOOD.replace("shell = true", 'shell = "yes"'), ["'shell' is 'yes'", "true or false"]),
     "text for a number": (GOOD.replace("28.0", '"28"'), ["'supply_V' is '28'", "finite number"]),
-    "NaN for a number": (GOOD.replace("28.0", "nan"), ["'supply_V' is nan", "finite number"]),
-    "huge integer": (GOOD.replace("28.0", "9" * 400), ["'supply_V'", "finite number"]),
     "endless integer": (GOOD.replace("28.0", "9" * 5000), ["campaign.toml", "TOML"]),
     "endless hexadecimal": (GOOD.replace("28.0", "0x" + "f" * 9000), ["'supply_V'", "too many digits"]),
-    "a date": (GOOD.replace("28.0", "2020-01-01"), ["'supply_V'", "finite number"]),
     "start outside travel": (GOOD.replace("-48.0", "-60.0"), ["'lower.csv'", "start_angle_deg is -60", "-55 to 45"]),
-    "target outside travel": (GOOD.replace("22.0", "45.1"), ["target_angle_deg is 45.1", "-55 to 45"]),
     "outside by a constant": (GOOD + "[records.constants]\ntheta_D = 1.0", ["target_angle_deg is 57.29", "-55 to 45"]),
-    "half a shell": (GOOD + "[records.constants]\nshell = 0.5", ["shell is 0.5", "true or false"]),
-    "no supply": (GOOD.replace("28.0", "0.0"), ["supply_V is 0", "1 to 100"]),
     "unknown plant": (GOOD.replace("shell_transfer_arm", "shell_transfer_am"),
                       ["campaign.toml", "plant 'shell_transfer_am'", "did you mean 'shell_transfer_arm'"]),
     "unknown effect": ('effects = ["columb"]\n' + GOOD, ["effect 'columb'", "did you mean 'coulomb'"]),
@@ -140,30 +113,16 @@ TOML = {
     "effects of a wrong kind": ('effects = "coulomb"\n' + GOOD, ["'effects' is 'coulomb'", "list"]),
     "unknown constant": (GOOD + "[records.constants]\nKp = 1.0", ["'Kp'", "did you mean 'K_p'"]),
     "unknown shared constant": (GOOD + "[constants]\nKp = 1.0", ["'Kp' in constants of the campaign", "'K_p'"]),
-    "constant of a wrong kind": (GOOD + '[records.constants]\nK_p = "1"', ["'constants.K_p' is '1'", "finite number"]),
-    "infinite constant": (GOOD + "[records.constants]\nK_p = inf", ["'constants.K_p' is inf", "finite number"]),
     "unknown input": (GOOD + "[records.inputs]\nu = 'drive_V'", ["'u'", "not an input", "there is none"]),
     "restart of an arm": (GOOD + "restart_s = 1.0", ["'lower.csv'", "restart_s", "starts at rest"]),
     "negative restart": (GOOD + "restart_s = -1.0", ["'restart_s' is -1.0", "above 0"]),
-    "restart of a wrong kind": (GOOD + "restart_s = true", ["'restart_s' is true", "seconds"]),
     "window of one": (GOOD + "window_s = [0.7]", ["'window_s' is [0.7]", "[begin, end]"]),
-    "window of three": (GOOD + "window_s = [0.0, 0.7, 1.0]", ["'window_s'", "[begin, end]"]),
-    "window of text": (GOOD + 'window_s = ["a", 1]', ["'window_s.0' is 'a'", "[begin, end]"]),
-    "backward window": (GOOD + "window_s = [0.7, 0.0]", ["window_s is [0.7, 0]", "end after its beginning"]),
-    "short window": (GOOD + "window_s = [0.0, 0.018]", ["19 samples", "at least 20"]),
-    "unknown hold": (GOOD + "hold = 'cubic'", ["'hold' is 'cubic'", "'linear' or 'zero'"]),
-    "negative gyro range": ("gyro_range_deg_s = -200\n" + GOOD, ["'gyro_range_deg_s' is -200", "above 0"]),
     "unknown parameter": (GOOD + "[parameters.etta3]\nlow = 1.0", ["parameter 'etta3'", "did you mean 'eta3'"]),
-    "unknown effect parameter": (GOOD + "[parameters.'coulomb.size']\nlow = 1.0", ["'coulomb.size'", "coulomb"]),
-    "unknown nested parameter": (GOOD + "[parameters.coulomb.size]\nlow = 1.0", ["'coulomb.size'", "coulomb"]),
-    "empty parameter table": (GOOD + "[parameters.coulomb]", ["parameter 'coulomb'", "unknown"]),
     "misspelt bound": (GOOD + "[parameters.p0]\nlo = 1.0", ["parameters.p0", "'lo'", "did you mean 'low'"]),
     "crossed bounds": (GOOD + "[parameters.p0]\nlow = 3.2e6\nhigh = 3.1e6", ["parameters.p0", "3.2e+06", "low below"]),
     "low above the declared high": (GOOD + "[parameters.p0]\nlow = 5e6", ["parameters.p0", "5e+06", "3.5e+06"]),
-    "bound of a wrong kind": (GOOD + "[parameters.p0]\nlow = '1'", ["parameters.p0", "'low' is '1'", "finite number"]),
     "parameter without table": (GOOD + "[parameters]\np0 = 3.0", ["'parameters.p0' is 3.0", "table"]),
     "repeat of nothing": (GOOD + 'repeat_of = "lowr.csv"', ["repeat_of 'lowr.csv'", "another record"]),
-    "repeat of itself": (GOOD + 'repeat_of = "lower.csv"', ["repeat_of 'lower.csv'", "there is none"]),
     "repeats in a circle": (
         GOOD + 'repeat_of = "b.csv"' + ENTRY.replace("lower.csv", "b.csv") + 'repeat_of = "lower.csv"',
         ["circle", "'lower.csv', 'b.csv', 'lower.csv'"],
@@ -172,20 +131,12 @@ TOML = {
     "same file by another name": (GOOD + ENTRY.replace("lower.csv", "./lower.csv"), ["'./lower.csv'", "two records"]),
     "missing file": (GOOD.replace("lower.csv", "lowre.csv"), ["'lowre.csv' does not exist", "mean 'lower.csv'"]),
     "absolute file": (GOOD.replace("lower.csv", "/etc/lower.csv"), ["'/etc/lower.csv'", "out of the campaign"]),
-    "file above": (GOOD.replace("lower.csv", "../campaign/lower.csv"), ["'../campaign/lower.csv'", "folder"]),
-    "file on a drive": (GOOD.replace("lower.csv", "C:/lower.csv"), ["'C:/lower.csv'", "folder"]),
-    "a folder as file": (GOOD.replace("lower.csv", "."), ["file '.'", ".csv"]),
-    "no name of a file": (GOOD.replace("lower.csv", ""), ["'file' is ''", "CSV file"]),
     "zero in the name": (GOOD.replace("lower.csv", "lower\\u0000.csv"), ["CSV file"]),
     "long name": (GOOD.replace("lower.csv", "x" * 5000 + ".csv"), ["does not exist"]),
-    "empty campaign": ("", ["campaign.toml", "missing"]),
     "broken TOML": (GOOD.replace("shell = true", "shell = = true"), ["campaign.toml", "not valid TOML", "line 9"]),
-    "key twice": (GOOD + "shell = true", ["campaign.toml", "not valid TOML", "Cannot overwrite a value"]),
     "binary TOML": (b"\xff\xfe\x00\x01", ["campaign.toml, line 1", "UTF-8"]),
-    "binary below": (GOOD.encode() + b"\n# \xff\n", ["campaign.toml, line 12", "UTF-8"]),
     "deep TOML": ("a = " + "[" * 5000, ["campaign.toml", "TOML"]),
     "deep tables": (GOOD + "[records.constants." + ".".join("a" * 3000) + "]", ["'constants.a'", "finite number"]),
-    "long key": ("k" * 50_000 + " = 1\n" + GOOD, ["unknown"]),
     "line break in a key": ('"a\\nb" = 1\n' + GOOD, ["'a\\nb'", "unknown"]),
 }  # fmt: skip
 
@@ -196,12 +147,7 @@ def test_toml(write, toml, fragments):
     assert_says(refusal(write(toml, lower=csv())), fragments)
 
 
-def test_the_good_ones_are_good(write):
-    assert read_campaign(write(GOOD, lower=csv())).records[0].n_samples == 60
-
-
-@pytest.mark.parametrize("step", [0.01, 0.5])
-@pytest.mark.parametrize("sign", [1, -1])
+@pytest.mark.parametrize(("step", "sign"), [(0.01, 1), (0.5, -1)])
 def test_saturation(write, arm_columns, step, sign):
     speed = np.clip(sign * np.round(arm_columns["angular_velocity_deg_s"] * 3 / step) * step, -200, 200)
     assert np.sum(np.abs(speed) == 200) > 5
@@ -238,16 +184,11 @@ def test_links_out_of_the_folder(write, tmp_path):
 
 def test_other_than_a_campaign(write, tmp_path):
     folder = write(GOOD, lower=csv())
+    assert read_campaign(folder).records[0].n_samples == 60
     assert_says(refusal(tmp_path / "nothing"), ["nothing' does not exist", "campaign.toml"])
     assert_says(refusal(tmp_path), ["holds no campaign.toml"])
     assert_says(refusal(folder / "lower.csv"), ["lower.csv' is a record", "campaign.toml is expected"])
     assert_says(refusal("a\0b"), ["does not exist"])
-
-
-def test_only_csv_files_are_read(write):
-    folder = write(GOOD.replace("lower.csv", "lower.csv.gz"), lower=csv())
-    (folder / "lower.csv.gz").write_text(csv())
-    assert_says(refusal(folder), ["'lower.csv.gz'", ".csv"])
 
 
 def test_what_is_too_large_or_counts_nowhere(write, tmp_path):

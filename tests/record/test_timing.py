@@ -17,13 +17,10 @@ def read(write, times, **more):
     return read_campaign(write(lower=columns)).records[0]
 
 
-@pytest.mark.parametrize("times", [
-    np.arange(-100, 1000) / 1000,
-    np.round(np.arange(-100, 1000) / 300, 3),  # rounded to 1 ms, up to 15 % of an interval off
-    np.round(np.arange(-100, 1000) / 800, 4),
-    np.arange(-100, 1000) / 1024 + np.random.default_rng(1).normal(0, 1e-7, 1100) * (np.arange(-100, 1000) != 0),
-])  # fmt: skip
-def test_rounded_times_are_even(write, times):
+@pytest.mark.parametrize(("rate", "digits"), [(1000, 9), (300, 3), (800, 4), (1024, 6)])
+def test_rounded_times_are_even(write, rate, digits):
+    """Rounded to 1 ms they are up to 15 % of an interval off."""
+    times = np.round(np.arange(-100, 1000) / rate, digits)
     record = read(write, times)
     assert record.irregularity is None
     np.testing.assert_array_equal(record.measured, motion(times)[100:])
@@ -59,13 +56,6 @@ def test_a_lost_first_sample_does_not_count(write):
     np.testing.assert_allclose(record.measured[1:], motion(np.arange(1, 1000) / 1000), atol=1e-12)
 
 
-def test_a_gap_in_the_rest_does_not_matter(write):
-    times = np.concatenate([np.arange(-200, -100) / 100, np.arange(1000) / 1000])
-    record = read(write, times)
-    assert record.irregularity is None
-    assert record.rest.size == 100
-
-
 def test_irregular_times_are_resampled_with_a_warning(write):
     rng = np.random.default_rng(2)
     times = np.sort(np.arange(1200) / 1000 + rng.uniform(-0.0002, 0.0002, 1200) * (np.arange(1200) > 0))
@@ -81,12 +71,6 @@ def test_irregular_times_are_resampled_with_a_warning(write):
     np.testing.assert_allclose(np.diff(record.times), record.manoeuvre.interval)
     np.testing.assert_allclose(record.measured, motion(record.times), atol=3e-4)
     np.testing.assert_allclose(record.columns["drive_V"], record.times, atol=1e-9)
-
-
-def test_a_missing_sample_is_irregular(write):
-    with pytest.warns(IrregularSamplingWarning, match="largest is 2 times"):
-        record = read(write, np.delete(np.arange(-100, 1000) / 1000, 500))
-    assert record.measured.size == 1000
 
 
 def test_a_held_input_keeps_its_impulse():
@@ -130,7 +114,6 @@ def test_noise_stays_white_on_the_grid():
 @pytest.mark.parametrize(("times", "found"), [
     (np.arange(1000, 2000) / 1000, "first sample is at 1 s"),
     (np.arange(-1000, 0) / 1000, "0 samples after t = 0"),
-    (np.arange(-1000, 19) / 1000, "19 samples after t = 0"),
     (np.arange(25) * 1e-10, "apart"),
     (np.concatenate([np.arange(100) / 1000, [1e9]]), "unmeasured"),
     (np.arange(19) / 1000, "19 samples"),
@@ -140,7 +123,3 @@ def test_refused(write, times, found):
     folder = write(lower=columns)
     with pytest.raises(ArmidError, match=found):
         read_campaign(folder)
-
-
-def test_twenty_samples_are_enough(write):
-    assert read(write, np.arange(20) / 100).n_samples == 20
