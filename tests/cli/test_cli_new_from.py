@@ -140,9 +140,29 @@ def test_a_unit_with_a_prefix_is_no_other_number(run, tmp_path, drive, header, f
     assert "not used: 'Temp [C]'" in text
 
 
+@pytest.mark.parametrize(("header", "speed"), [("Time (ms),Position (mm),Tacho (mm/s),I (A)", "velocity_mm_s"),
+                                               ("t s,x mm,v m/min,I A", "velocity_m_min")])  # fmt: skip
+def test_a_straight_machine_keeps_its_units(run, tmp_path, header, speed):
+    rows = [f"{i},{50.0 + 0.01 * i * i},{0.02 * i},{0.1 * (i % 7)}" for i in range(60)]
+    (tmp_path / "a.csv").write_text("\n".join([header, *rows, ""]))
+    assert run("new", "campaign", "lift", "--from", "a.csv").code == 0
+    table = read_table(tmp_path / "lift" / "a.csv", "a.csv").columns
+    assert {"position_mm", speed, "current_A"} <= set(table)
+    assert table["position_mm"][0] == 50.0
+    assert table["time_s"][1] == pytest.approx(1e-3 if "ms" in header else 1.0)
+    assert "GUESS: its unit" not in (tmp_path / "lift" / "campaign.toml").read_text()
+
+
+def test_an_input_of_a_turning_machine_may_have_any_unit(run, tmp_path):
+    plain_file(tmp_path / "a.csv", "duty [%]")
+    assert run("new", "campaign", "wheel", "--from", "a.csv").code == 0
+    assert "command" in read_table(tmp_path / "wheel" / "a.csv", "a.csv").columns
+    assert run("check", "wheel").code == 0
+
+
 def test_an_unknown_unit_and_a_time_that_falls_are_refused(refused, tmp_path):
-    plain_file(tmp_path / "a.csv", "U [bar]")
-    assert "the unit of 'U [bar]' is not known: one of s, " in refused("new", "campaign", "wheel", "--from", "a.csv")
+    (tmp_path / "a.csv").write_text("t [s],U [V],angle [gon]\n0,1,2\n1,1,3\n")
+    assert "the unit of 'angle [gon]' is 'gon': one of deg, " in refused("new", "campaign", "wheel", "--from", "a.csv")
     plain_file(tmp_path / "b.csv", "U [V]", lambda t: np.where(np.arange(N) < 900, t, t - 2.0))
     assert "time does not rise from row 900 to row 901" in refused("new", "campaign", "wheel", "--from", "b.csv")
     assert not (tmp_path / "wheel").exists()

@@ -87,6 +87,53 @@ def test_a_command_is_known_exactly(command):
     assert noise_of_input(command, [(still, True)]) == InputNoise()
 
 
+@pytest.mark.parametrize(("drive", "rms"), [
+    (5.8 + 0.5 * np.sin(2.0 * np.pi * 0.7 * TIMES) + np.random.default_rng(1).normal(0.0, 0.03, TIMES.size), 0.03),
+    (0.5 * np.sin(2.0 * np.pi * 0.7 * TIMES), 0.0), (np.random.default_rng(2).normal(0.0, 0.5, TIMES.size), 0.0),
+], ids=["measured", "smooth", "white excitation"])  # fmt: skip
+def test_without_a_rest_it_is_what_is_white_in_the_column(drive, rms):
+    """A controller that holds a load never stands still. What is as large as the input is a command."""
+    assert noise_of_input(drive, [(np.sin(TIMES), True)]).rms == pytest.approx(rms, rel=0.15)
+
+
+def held(folder, seed=4):
+    """Return a campaign of an axis that a controller moves and holds against a weight, its torque measured with noise.
+
+    The true torque follows the true angle; a fine encoder sees what the noise of the column does from the first row on.
+    """
+    tables, rng, weight = {}, np.random.default_rng(seed), 0.4
+    kept = np.exp(-DAMPING * INTERVAL / INERTIA)
+    way = INTERVAL - INERTIA / DAMPING * (1.0 - kept)
+    for i, size in enumerate((1.0, -0.7, 1.3)):
+        target = size * np.clip((TIMES[:600] - 1.0) / 0.8, 0.0, 1.0) - size * np.clip(
+            (TIMES[:600] - 3.5) / 0.5, 0.0, 0.6
+        )
+        q, v, rows = 0.0, 0.0, []
+        for aim in target:
+            torque = weight + 2.0 * (aim - q) - 0.4 * v
+            rows.append((torque, q))
+            pushed = torque - weight
+            q += v / DAMPING * INERTIA * (1.0 - kept) + pushed / DAMPING * way
+            v = kept * v + (1.0 - kept) * pushed / DAMPING
+        true, angle = np.array(rows).T
+        tables[f"r{i}.csv"] = {"time_s": TIMES[:600], "drive_N_m": true + rng.normal(0.0, 0.01, 600),
+                               "angle_rad": angle + rng.normal(0.0, 2e-6, 600)}  # fmt: skip
+    entries = (
+        f'[[records]]\nfile = "{name}"\nrole = "{"holdout" if name == "r2.csv" else "train"}"\n' for name in tables
+    )
+    head = 'name = "held"\nplant = "rotary_arm"\nhold = "zero"\neffects = ["torque_offset"]\n'
+    fixed = "[parameters.gain]\nfixed = 1.0\n[parameters.gravity_moment]\nfixed = 0.0\n"
+    return read_campaign(write_campaign(folder, head + "".join(entries) + fixed, tables))
+
+
+@pytest.mark.slow
+def test_a_load_that_a_controller_holds_lacks_nothing(tmp_path):
+    """Its starts are fitted as if what the noise does was white, which the covariance must know."""
+    found = close_loop(held(tmp_path / "held"), candidates=["coulomb", "stribeck"])
+    assert found.verdict == "no_discrepancy"
+    assert next(e.value for e in found.after.estimates if e.name == "inertia") == pytest.approx(INERTIA, rel=0.01)
+
+
 def test_how_far_it_moves_the_model(tmp_path):
     """A torque with noise turns a disc as a random walk with damping, whose variance is known."""
     declared = campaign(tmp_path / "axis", noisy)
@@ -140,7 +187,7 @@ def test_where_machine_and_input_stand_still_the_input_is_constant(tmp_path):
     assert still[:70].all()
     assert not still[100:1000].any()
     known = smoothed(column, InputNoise(rms=TORQUE_NOISE), still)
-    assert np.ptp(known.values[:70]) < 1e-3 * TORQUE_NOISE
+    assert np.ptp(known.values[:70]) < 0.02 * TORQUE_NOISE
     errors = known.errors(400, np.random.default_rng(1))[25]
     assert np.std(errors) == pytest.approx(TORQUE_NOISE / np.sqrt(still[:100].sum()), rel=0.2)
 

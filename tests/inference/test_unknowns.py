@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from armid.inference.model import Fit
-from armid.inference.unknowns import Unknown, freed
+from armid.inference.unknowns import Unknown, columns_about, freed
 
 RNG = np.random.default_rng(4)
 
@@ -78,3 +78,16 @@ def test_unknowns_whose_columns_nearly_cancel_move_together():
 
     assert cost(values) < 0.1 * cost(np.zeros(3))
     assert values == pytest.approx(exact(columns, truth), abs=0.1)
+
+
+def test_a_bent_answer_to_an_unknown_has_the_slope_of_its_tangent():
+    """What a constant does and a parameter makes up for must cancel to the last digit, or records seem to tell it."""
+    columns, bend = RNG.normal(size=(50, 2)), 1e4 * RNG.normal(size=50)
+    base = Straight(columns, np.zeros(50))
+
+    def bent(records, value):
+        return replace(records, residual=records.residual - value * columns[:, 1] - value**2 * bend)
+
+    unknowns = [Unknown("straight", lambda records, value: records.moved(0, value)), Unknown("bent", bent)]
+    found = columns_about(base, unknowns, np.zeros(2), np.empty(0), {})
+    np.testing.assert_allclose(found, columns, atol=1e-6)

@@ -7,9 +7,10 @@ from scipy.signal import lfilter
 
 from armid.estimation.least_squares import with_fitted_starts
 from armid.inference import prepared
+from armid.inference.shooting import on_short_pieces, on_whole_records
 from armid.loop import close_loop, report_of
 from armid.model import EFFECTS, Model
-from armid.problem.problem import replays
+from armid.problem.problem import by_record, replays
 from armid.problem.space import space_of
 from armid.record import read_campaign, write_campaign
 
@@ -63,21 +64,57 @@ def test_the_start_of_an_axis_is_fitted(tmp_path):
     assert not campaign.holdout[0].pieces[0].shown_start
 
 
+def over_the_top(folder, commands, limit=np.inf):
+    """Return a campaign of a pendulum that goes over the top, with a limit of its drive [N m]; the last is held out."""
+    rng, tables = np.random.default_rng(1), {}
+    for i, command in enumerate(commands):
+        angle, _ = swing(np.clip(command, -limit, limit), 0.01, (0.0, 0.0))
+        tables[f"r{i}.csv"] = {"time_s": STEP_S * np.arange(len(command)), "drive_N_m": command,
+                               "angle_rad": angle + 1e-3 * rng.standard_normal(len(command))}  # fmt: skip
+    assert max(np.ptp(table["angle_rad"]) for table in tables.values()) > 2.0 * np.pi
+    roles = ["train"] * (len(tables) - 1) + ["holdout"]
+    entries = [RECORD.format(file=file, role=role) for file, role in zip(tables, roles, strict=True)]
+    toml = 'name = "over"\nplant = "rotary_arm"\nhold = "zero"\n[parameters.gain]\nfixed = 1.0\n'
+    return read_campaign(write_campaign(folder, toml + "".join(entries), tables))
+
+
 def test_a_pendulum_that_goes_over_the_top_is_estimated_from_the_beginning_of_its_records(tmp_path):
     """Simulated for long from a parameter that is a little off, it goes over the top another time."""
-    rng, times, tables = np.random.default_rng(1), STEP_S * np.arange(1200), {}
-    for i in range(2):
-        torque = np.repeat(rng.choice([-0.45, 0.0, 0.45], 12), 100)
-        torque[:100] = 0.0
-        angle, _ = swing(torque, 0.01, (0.0, 0.0))
-        tables[f"r{i}.csv"] = {"time_s": times, "angle_rad": angle + 1e-3 * rng.standard_normal(times.size),
-                               "drive_N_m": torque}  # fmt: skip
-    assert max(np.ptp(table["angle_rad"]) for table in tables.values()) > 2.0 * np.pi
-    toml = 'name = "over"\nplant = "rotary_arm"\nhold = "zero"\n'
-    toml += "".join(RECORD.format(file=file, role="train") for file in tables)
-    campaign = read_campaign(write_campaign(tmp_path / "c", toml, tables))
+    rng = np.random.default_rng(1)
+    commands = [np.repeat([0.0, *rng.choice([-0.45, 0.0, 0.45], 11)], 100) for _ in range(3)]
+    campaign = over_the_top(tmp_path / "c", commands)
     _, declared = prepared(Model(campaign.plant), campaign, {})
     assert declared.x == pytest.approx([INERTIA, GRAVITY_MOMENT, 0.01], rel=1e-3)
+
+
+@pytest.mark.slow
+def test_what_its_drive_lacks_is_found_on_short_pieces_of_its_records(tmp_path):
+    """Over a whole record the motion without it has nothing in common with what was measured."""
+    rng, said = np.random.default_rng(2), []
+    commands = [np.repeat([0.0, *rng.uniform(-0.7, 0.7, 11)], 100) for _ in range(4)]
+    campaign = over_the_top(tmp_path / "c", commands, limit=0.4)
+    candidates = {n: EFFECTS[n] for n in ("drive_saturation", "viscous", "coulomb")}
+    found = close_loop(Model(campaign.plant), campaign, candidates, told=said.append)
+    assert "looking at short pieces of the records" in said
+    assert [(s.effect, s.form) for s in found.steps] == [("drive_saturation", "hard")]
+    sharpness = next(e for e in found.after.estimates if e.name == "drive_saturation.sharpness")
+    assert sharpness.value == pytest.approx(1.0 / 0.4, rel=5e-3)
+
+
+def test_short_pieces_are_all_of_a_record_and_start_where_it_is(tmp_path):
+    campaign, _ = swinging(tmp_path / "c", 0.01, toml=TOML.replace("driven_axis", "rotary_arm").replace(
+        "[constants]\ngain = 1.0\ngravity_moment = 0.5\n", "[parameters.gain]\nfixed = 1.0\n"))  # fmt: skip
+    library, declared = prepared(Model(campaign.plant), campaign, {})
+    short, fit = on_short_pieces(library, declared)
+    assert [len(r.pieces) for r in short.data.records] == [4] * 3
+    assert [sum(r.lengths) for r in short.data.records] == [sum(r.lengths) for r in library.data.records]
+    for record in (ready.record for ready in by_record(fit.records.replays)):
+        for piece in record.pieces:
+            there = record.signals[0].measured[piece.start_index]
+            assert piece.manoeuvre.constants["start_angle"] == pytest.approx(there, abs=1e-3)
+    again = on_whole_records(fit, library)
+    assert again.x == pytest.approx(declared.x, rel=1e-4)
+    assert again.chi2 == pytest.approx(declared.chi2, rel=1e-4)
     assert declared.chi2 < 1.3 * len(declared.residual)
     problem = declared.records
     assert problem.beginning(0.25).chi2(declared.z)[0] < 0.5 * problem.chi2(declared.z)[0]

@@ -68,6 +68,10 @@ LISTED = (
     ("hydraulic_boom", "dry_friction", "dahl", {"level": 0.05, "way": 0.01}, "presliding",
      {"level": 0.05, "way": 0.01, "width": WIDTH * 0.6}),
     ("elastic_joint", "backlash", "coupling", {"gap": 0.03}, "backlash", {"width": 0.03}),
+    ("cart", "saturation", "hard", {"sharpness": 0.4}, "drive_saturation:hard", {"sharpness": 0.4}),
+    # one way alone is both ways less, and a difference
+    ("motor_disc", "asymmetry", "gain", {"share": 0.2}, "drive_asymmetry+drive_gain",
+     {"drive_asymmetry.difference": -0.1, "drive_gain.error": -0.1}),
 )  # fmt: skip
 
 
@@ -75,13 +79,14 @@ LISTED = (
 @pytest.mark.parametrize(("name", "family", "form", "sizes", "effect", "values"), LISTED)
 def test_a_form_that_the_library_holds_is_its_form(name, family, form, sizes, effect, values):
     plant = OF_NAME[name]
-    word, _, of_form = effect.partition(":")
-    known = applicable({**sensor_effects(plant), **EFFECTS}, plant)[word]
-    known = known.in_form(of_form) if of_form else known
+    words = [word.partition(":") for word in effect.split("+")]
+    library = applicable({**sensor_effects(plant), **EFFECTS}, plant)
+    known = [library[word].in_form(of_form) if of_form else library[word] for word, _, of_form in words]
+    values = {n if "." in n else f"{words[0][0]}.{n}": v for n, v in values.items()}
     planted = Planted(form_of(family, form), sizes)
     plain = both(name, "zero")
     # friction that changes its sign takes short steps
-    run = both(name, "zero", [planted], [known], {f"{word}.{n}": v for n, v in values.items()}, n_sub=40)
+    run = both(name, "zero", [planted], known, values, n_sub=40)
     moved = np.max(np.abs(run.ours - plain.ours))
     assert moved > 1e-3
     assert np.max(np.abs(run.ours - run.theirs)) < 2e-3 * moved

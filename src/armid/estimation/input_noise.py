@@ -25,8 +25,8 @@ DRAWN_ERRORS, SEED_OF_ERRORS = 16, 1
 SHARING, ROUNDS = 9, 40
 # Weights of neighbours in first and second differences.
 CHANGE, BEND = (-1.0, 1.0), (1.0, -2.0, 1.0)
-# Least variance of a difference, in that of the noise.
-STRAIGHTEST = 1e-12
+# Least variance of a difference, in that of the noise: what is held more tightly a fine sensor would show to be wrong.
+STRAIGHTEST = 1e-5
 # Cosines that are tried at once, and at most: fast errors move a machine least. Sum of squares, in units of the noise,
 # from which on samples see a signal.
 AT_ONCE, MOST_COSINES, SMALLEST_SEEN = 16, 1024, 0.1

@@ -28,8 +28,8 @@ from armid.problem.starts import fits_starts, likely_candidate, with_starts
 
 S = TypeVar("S")
 T = TypeVar("T")
-# Step of the differences, as a share of the range: above rounding, below curvature.
-STEP = 1e-4
+# Step of the differences, as a share of the range: above rounding, below curvature. Ranges of strengths are wide.
+STEP = 1e-6
 # A parameter this close to its bound, as a share of the range, is held by the bound and not by the records.
 AT_BOUND = 1e-4
 # Relative fall of chi2 in one step at which a fit has arrived.

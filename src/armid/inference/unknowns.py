@@ -36,7 +36,7 @@ from armid.problem.problem import ReadyRecord, signals_of_each, with_each
 from armid.problem.starts import fits_starts, with_shown_starts, with_starts
 
 # Step of the differences, in prior standard deviations.
-UNKNOWN_STEP = 1e-2
+UNKNOWN_STEP = 1e-3
 # Of a fit that is polished: relative change at which it ends, and how far inside the box it stays, as a share.
 ARRIVED_STEP, INSIDE = 1e-8, 1e-6
 # Fall of the weighted sum of squares at which a fit has arrived. Columns are old below this share of a foretold fall.
@@ -310,9 +310,11 @@ def columns_about(
     kept: columns that are known.
     """
     stepped = [i for i, u in enumerate(unknowns) if u.name not in kept and u.column is None]
-    points = np.vstack([values, values + UNKNOWN_STEP * np.eye(len(values))[stepped]])
-    residuals = residuals_at(base, unknowns, points, np.tile(z, (len(points), 1)))
-    by_steps = dict(zip(stepped, (residuals[0] - residuals[1:]) / UNKNOWN_STEP, strict=True))
+    steps = UNKNOWN_STEP * np.eye(len(values))[stepped]
+    points = np.vstack([values - steps, values + steps])
+    below, above = np.split(residuals_at(base, unknowns, points, np.tile(z, (len(points), 1))), 2)
+    # a constant whose slope bends could be told apart from a parameter that does the same
+    by_steps = dict(zip(stepped, (below - above) / (2.0 * UNKNOWN_STEP), strict=True))
 
     def column(i: int, unknown: Unknown) -> Array:
         if unknown.name in kept:
@@ -322,5 +324,5 @@ def columns_about(
         rest = moved(base, [u for u in unknowns if u is not unknown], np.delete(values, i))
         return unknown.column(rest, z, float(values[i]))
 
-    columns = np.array([column(i, u) for i, u in enumerate(unknowns)]).reshape(len(unknowns), residuals.shape[1])
+    columns = np.array([column(i, u) for i, u in enumerate(unknowns)]).reshape(len(unknowns), base.measured.size)
     return np.where(np.isfinite(columns).all(axis=1, keepdims=True), columns, 0.0).T

@@ -216,15 +216,17 @@ def noise_of_input(values: Array, outputs: Sequence[tuple[Array, bool]]) -> Inpu
 def white_part(values: Array) -> float:
     """Return the rms of white noise in a column, 0 where it is too large to be noise or where nothing is white.
 
-    Second differences of white noise are correlated by -2/3 from row to row, those of a smooth signal by nearly 1. The
-    stretches of 50 rows in which they are like those of noise tell its size, where they are half of all.
+    Second differences of white noise are correlated by -2/3 from row to row, those of a smooth signal by nearly 1, and
+    those of a command that jumps are 0 but at a jump. The stretches of 50 rows in which they are like those of noise
+    tell its size, where they are half of all.
     """
     bends = np.diff(values, 2)
     stretches = bends[: bends.size // FEWEST_REST_SAMPLES * FEWEST_REST_SAMPLES].reshape(-1, FEWEST_REST_SAMPLES)
     squares = np.sum(stretches**2, axis=1)
     alike = np.sum(stretches[:, 1:] * stretches[:, :-1], axis=1) / np.maximum(squares, np.finfo(np.float64).tiny)
-    white = np.abs(alike - WHITE_BENDS) < WHITENESS
-    if np.mean(white) < 0.5:
+    everywhere = np.median(stretches**2, axis=1) > SPREAD_OF_NOISE * squares / FEWEST_REST_SAMPLES
+    white = everywhere & (np.abs(alike - WHITE_BENDS) < WHITENESS)
+    if not len(white) or np.mean(white) < 0.5:
         return 0.0
     rms = float(np.sqrt(np.median(squares[white]) / FEWEST_REST_SAMPLES / 6.0))
     return rms if rms < LARGEST_NOISE * float(np.std(values)) else 0.0
@@ -417,8 +419,9 @@ LEAP = 2.0
 # samples, and leaves it so: a machine that ends at rest or at an even speed slows down before.
 ABRUPT, RUN_UP = 0.2, 4
 # Correlation of neighbours among second differences of white noise, and how far that of 50 of them may be from it; the
-# largest noise of an input, as a share of how far the input moves.
-WHITE_BENDS, WHITENESS, LARGEST_NOISE = -2.0 / 3.0, 0.2, 0.2
+# least median of their squares, in the mean (of a normal noise 0.45); the largest noise of an input, as a share of how
+# far the input moves.
+WHITE_BENDS, WHITENESS, SPREAD_OF_NOISE, LARGEST_NOISE = -2.0 / 3.0, 0.2, 0.2, 0.2
 
 
 @dataclass(frozen=True)
