@@ -480,8 +480,8 @@ def carried_sentence(loop: ClosedLoop) -> str:
     worse = unseen.errors.joint_nrmse / last.errors.joint_nrmse - 1.0
     names = " + ".join(s.effect for s in loop.withdrawn.steps)
     stands = f"the model with {' + '.join(loop.effects)}" if loop.effects else "the declared model"
-    return (f"The train records ask for {names}, but the records held out are simulated {worse:.0%} worse with it "
-            f"({missed}): it is withdrawn, and {stands} stands.")  # fmt: skip
+    return (f"Of all names {names} suits the train records best, but the records held out are simulated {worse:.0%} "
+            f"worse with it ({missed}): it is withdrawn, and {stands} stands.")  # fmt: skip
 
 
 def doubtful(loop: ClosedLoop) -> str:
