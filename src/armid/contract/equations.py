@@ -28,8 +28,9 @@ from armid.model.effect import Equation
 # Shares of the size of an output: at null, and against scipy.
 NULL_TOLERANCE, REFERENCE_TOLERANCE = 1e-12, 1e-5
 N_CANDIDATES, AWAY = 16, 0.3
-# Shares of the range at which the response to a strength is compared, and by how much it may bend between them.
-SMALL, BENT = np.array([1e-4, 2e-4]), 0.05
+# Shares of the range at which the response to a strength is compared, and by how much it may bend between them. The
+# share up to which an effect may do nothing, such as a limit: a search tries it, too.
+SMALL, BENT, THRESHOLD = np.array([1e-4, 2e-4]), 0.05, 0.4
 
 
 def check_plant(plant: Plant) -> Iterator[ContractPoint]:
@@ -240,19 +241,26 @@ def distance(one: Model, x: Array, other: Model, y: Array, manoeuvre: Manoeuvre)
 
 
 def responds(effect: Effect, model: Model, manoeuvres: list[Manoeuvre]) -> ContractPoint:
-    """Tell whether the signal answers in proportion to each small strength, without which nothing finds the effect."""
-    strengths, still = from_null(model, effect, SMALL), nominal(model)[np.newaxis]
+    """Tell whether the signal answers in proportion to each small strength, or not at all below a threshold.
+
+    Without that nothing finds the effect.
+    """
+    shares = np.append(SMALL, THRESHOLD)
+    strengths, still = from_null(model, effect, shares), nominal(model)[np.newaxis]
     if not strengths.size:
         return ContractPoint("responds", False, "no parameter has a null value")
-    answers = np.zeros((len(strengths), 2))
+    answers = np.zeros((len(strengths), len(shares)))
     for m in manoeuvres:
         both = np.concatenate([still, strengths.reshape(-1, still.shape[1])])
         run = simulate(model, m, both, calibrate(model, m, both, spans=False).schedule)
         output = run.joint(model.plant.sizes)
-        moved = np.abs(output[1:] - output[0]).max(axis=1).reshape(len(strengths), 2) / SMALL
-        answers = np.where(moved[:, 1:] > answers[:, 1:], moved, answers)
+        moved = np.abs(output[1:] - output[0]).max(axis=1).reshape(answers.shape) / shares
+        tells_more = (moved[:, 1] > answers[:, 1]) | ((moved[:, 1] == answers[:, 1]) & (moved[:, 2] > answers[:, 2]))
+        answers = np.where(tells_more[:, np.newaxis], moved, answers)
     names = [p.name for p in strengths_of(effect)]
-    steady = (answers[:, 1] > 0.0) & (np.abs(answers[:, 0] - answers[:, 1]) <= BENT * answers[:, 1])
+    first, second, far = answers.T
+    in_proportion = (second > 0.0) & (np.abs(first - second) <= BENT * second)
+    steady = in_proportion | ((second == 0.0) & (far > 0.0))
     bent = [n for n, kept in zip(names, steady, strict=True) if not kept]
     return finding("responds", bent, "at null the signal does not answer in proportion to {}: nothing would trace it",
                    "at null the signal answers in proportion to each strength")  # fmt: skip
