@@ -40,8 +40,8 @@ REACH_OF_STRENGTHS = 16.0
 SAME_ORDER = 2.0
 # How much wider a range becomes whose end holds a strength, and how often.
 WIDER_RANGE, MOST_WIDENED = 8.0, 4
-# Share of what a model leaves, below which noise of the inputs is a trifle: a thousandth of its square. What ends near it
-# is judged again with that noise.
+# Share of what a model leaves, below which noise of the inputs is a trifle: a thousandth of its square. What ends near
+# it is judged again with that noise.
 TRIFLE = 0.03
 # Shares of each record to which a first estimate is carried on.
 GROWING = (0.125, 0.25, 0.5, 0.75)
