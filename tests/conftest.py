@@ -30,7 +30,7 @@ settings.load_profile("armid")
 ROOT = Path(__file__).parents[1]
 # Fast tests, or the loops of others, run the lines of these packages too: their slow ones go without the tracer of
 # coverage, which makes them up to twice as long.
-NOT_TRACED = ("bench", "contract", "engine", "estimation", "identifiers", "inference", "model", "problem")
+NOT_TRACED = ("bench", "contract", "engine", "identifiers", "model", "problem")
 # Those that take longest come first, so that two processes end together.
 LONGEST = (
     "test_a_late_voltage_is_no_late_torque", "test_the_small_blind_suite", "test_every_effect_keeps_its_contract",
