@@ -42,8 +42,8 @@ def test_starting_files_of_then_and_now_pass_their_contract(kind, on, capsys, tm
     assert text.count("#") >= 3
     frozen = FROZEN / file.name
     for each in [file] if text == frozen.read_text(encoding="utf-8") else [file, frozen]:
-        told = ran(capsys, "check", f"{each}:my_{kind}", *on)
-        assert re.search(r"^(\d+) of \1 points hold$", told, re.MULTILINE)
+        output = ran(capsys, "check", f"{each}:my_{kind}", *on)
+        assert re.search(r"^(\d+) of \1 points hold$", output, re.MULTILINE)
 
 
 def test_every_kind_of_starting_file_that_is_frozen_is_still_there():

@@ -34,7 +34,7 @@ def golden(name):
     return json.loads((GOLDEN / f"{name}.json").read_text(encoding="utf-8"))
 
 
-def told(result):
+def reported(result):
     """Return what a result writes into its file, with the keys that it always had; no figure is drawn."""
     found = result.to_dict()
     assert_keys(found, json.loads((ROOT / "tests" / "frozen" / "keys.json").read_text())[result.kind.file], "result")
@@ -149,14 +149,14 @@ def pairs(table):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", CAMPAIGNS)
 def test_closing_the_loop(name):
-    assert_same(loop_digest(told(armid.close_loop(ROOT / "studies" / "campaigns" / name))), golden("loops")[name])
+    assert_same(loop_digest(reported(armid.close_loop(ROOT / "studies" / "campaigns" / name))), golden("loops")[name])
 
 
 @pytest.mark.parametrize("name", [n if n in FAST else pytest.param(n, marks=pytest.mark.slow) for n in IDENTIFIERS])
 def test_identifying(name, paper_arm_folder):
     fitness = "rmse" if "least_squares" in name else "similarity"
     result = armid.identify(paper_arm_folder, identifier=name, fitness=fitness, budget=1500, seed=3)
-    found, wanted = identified_digest(told(result)), golden("identified")[name]
+    found, wanted = identified_digest(reported(result)), golden("identified")[name]
     # A trust region ends some steps earlier or later on another processor (281 to 361 simulations were seen).
     assert found.pop("used") == pytest.approx(wanted.pop("used"), rel=0.5)
     assert_same(found, wanted)

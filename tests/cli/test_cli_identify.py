@@ -163,10 +163,10 @@ def test_a_warning_of_several_records_is_told_once(run, tmp_path, write_axis, ax
         (folder / name).write_text("\n".join(rows[:100] + rows[103 + ord(name[0]) % 3 :]) + "\n")
     with warnings.catch_warnings():
         warnings.simplefilter("default")
-        told = run("identify", folder, "--budget", "80").err.splitlines()
-    assert len(told) == 1, told
-    assert told[0].startswith("armid: warning: axis/a.csv: irregular sampling: ")
-    assert told[0].endswith("; the same with other numbers: b.csv, c.csv")
+        messages = run("identify", folder, "--budget", "80").err.splitlines()
+    assert len(messages) == 1, messages
+    assert messages[0].startswith("armid: warning: axis/a.csv: irregular sampling: ")
+    assert messages[0].endswith("; the same with other numbers: b.csv, c.csv")
 
 
 def test_a_whole_run(run, small_folder, tmp_path):

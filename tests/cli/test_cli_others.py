@@ -154,12 +154,12 @@ def test_a_reader_that_leaves_changes_nothing_but_what_he_reads(small_folder, ro
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full here, a file that is always full")
 def test_an_output_that_is_full_is_one_sentence():
-    for told in (["--help"], ["list", "plants", "--json"]):
-        asked = [sys.executable, "-m", "armid", *told]
+    for words in (["--help"], ["list", "plants", "--json"]):
+        asked = [sys.executable, "-m", "armid", *words]
         with open("/dev/full", "wb") as full:
             said = subprocess.run(asked, check=False, stdout=full, stderr=subprocess.PIPE, text=True)
-        assert said.returncode == 2, told
-        assert said.stderr == "armid: the standard output cannot be written: No space left on device\n", told
+        assert said.returncode == 2, words
+        assert said.stderr == "armid: the standard output cannot be written: No space left on device\n", words
 
 
 def test_every_command_tells_an_example_that_exists(every_command):

@@ -156,18 +156,18 @@ THIRD_ON_STAND = {
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("k", "told"), [(0, ON_STAND), (1, SECOND_ON_STAND), (2, THIRD_ON_STAND)])
-def test_effects_move_the_arm_as_on_the_test_stand(k, told, arm: Model, manoeuvres: dict[str, Manoeuvre]) -> None:
+@pytest.mark.parametrize(("k", "planted"), [(0, ON_STAND), (1, SECOND_ON_STAND), (2, THIRD_ON_STAND)])
+def test_effects_move_the_arm_as_on_the_test_stand(k, planted, arm: Model, manoeuvres: dict[str, Manoeuvre]) -> None:
     """All effects, or all further forms, in one model that tests/contract compiles: one at its null adds nothing."""
     forms = [e.every_form[k] for e in applicable(EFFECTS, arm.plant).values() if k < len(e.every_form)]
     model = Model(arm.plant, tuple(form for form in forms if not refusal_of(form, arm.plant)))
     rest = {n: next((v for v in (p.null, p.fixed, p.nominal) if v is not None), p.low)
             for n, p in model.parameters.items()} | {"p0": 3.05e6, "k": 1.0, "eta3": 0.55, "n": 1.4}  # fmt: skip
-    each = [rest | {f"{name}.{n}": v for n, v in values.items()} for name, (values, *_) in told.items()]
+    each = [rest | {f"{name}.{n}": v for n, v in values.items()} for name, (values, *_) in planted.items()]
     population = np.array([list(candidate.values()) for candidate in (rest, *each)])
     for stroke in ("lower", "raise"):
         declared, *signals = simulate(model, manoeuvres[stroke], population, Schedule(16)).output
-        for (name, (_, on_stand, near)), signal in zip(told.items(), signals, strict=True):
+        for (name, (_, on_stand, near)), signal in zip(planted.items(), signals, strict=True):
             stood = stand_speed(stroke, population[0, :4], **on_stand)
             assert stood is not None
             missed, without = (np.abs(found - stood[0]).max() for found in (signal, declared))

@@ -48,14 +48,14 @@ def test_what_is_known_up_to_a_common_factor_is_told():
     slopes = np.column_stack([a, b, c])
     mass = Product(("mass",), (1.0,), 0.02, -(a + b))
     gain = Product(("gain", "drive"), (1.0, 1.0), 0.03, 2.0 * c)
-    told = common_factors(("p", "q", "r"), slopes, [mass, gain, Product(("other",), (1.0,), 0.02, d)])
-    assert told == (
+    factors = common_factors(("p", "q", "r"), slopes, [mass, gain, Product(("other",), (1.0,), 0.02, d)])
+    assert factors == (
         "these records give p, q, mass up to a common factor",
         "these records do not tell a change of r +1 %, gain*drive -0.5 %, made together",
     )  # fmt: skip
     three = Product(("mass",), (1.0,), 0.02, -(a + b + c))
-    told = common_factors(("p", "q", "r"), slopes, [three, Product(("other",), (1.0,), 0.02, d)])
-    assert told == ("these records give p, q, r, mass up to a common factor",)
+    factors = common_factors(("p", "q", "r"), slopes, [three, Product(("other",), (1.0,), 0.02, d)])
+    assert factors == ("these records give p, q, r, mass up to a common factor",)
     assert gain.public == "constant:gain*drive"
     assert common_factors(("p",), slopes[:, :1], [Product(("other",), (1.0,), 0.02, d)]) == ()
 

@@ -107,8 +107,8 @@ def test_without_noise_one_is_assumed_and_said(one_stroke, lowering, arm, arm_sp
     (clean,) = (r.signal(TRUTH[np.newaxis])[0] for r in one_stroke.replays)
 
     (train,) = lowering.train
-    told = with_noise(train, rms=0.0).with_measured({train.output: np.append(clean, train.measured[clean.size :])})
-    silent = replace(lowering, records=(told,))
+    other = with_noise(train, rms=0.0).with_measured({train.output: np.append(clean, train.measured[clean.size :])})
+    silent = replace(lowering, records=(other,))
     found = examine(silent, arm, arm_space)
     (level,) = found.information.levels
     assert level.assumed

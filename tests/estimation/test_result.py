@@ -120,7 +120,7 @@ def test_a_fit_that_does_not_carry_over_is_told(lowering_found):
 
 @pytest.mark.parametrize(("key", "noticed"), [("28.0", False), ("30.0", True)])
 def test_a_residual_of_little_more_than_noise_is_told(stand, tmp_path, key, noticed):
-    """A supply told as 30 V in place of 28 moves parameters at a chi2 of less than 2."""
+    """A supply declared as 30 V in place of 28 moves parameters at a chi2 of less than 2."""
     folder = tmp_path / "one"
     shutil.copytree(stand("--manoeuvres", "lower", "--holdout", "", "--repeats", "1", "--window-s", "0", "0.7"), folder)
     toml = folder / "campaign.toml"

@@ -90,12 +90,12 @@ def test_a_pendulum_that_goes_over_the_top_is_estimated_from_the_beginning_of_it
 @pytest.mark.slow
 def test_what_its_drive_lacks_is_found_on_short_pieces_of_its_records(tmp_path):
     """Over a whole record the motion without it has nothing in common with what was measured."""
-    rng, said = np.random.default_rng(2), []
+    rng, messages = np.random.default_rng(2), []
     commands = [np.repeat([0.0, *rng.uniform(-0.7, 0.7, 11)], 100) for _ in range(4)]
     campaign = over_the_top(tmp_path / "c", commands, limit=0.4)
     candidates = {n: EFFECTS[n] for n in ("drive_saturation", "viscous", "coulomb")}
-    found = close_loop(Model(campaign.plant), campaign, candidates, told=said.append)
-    assert "looking at short pieces of the records" in said
+    found = close_loop(Model(campaign.plant), campaign, candidates, told=messages.append)
+    assert "looking at short pieces of the records" in messages
     assert [(s.effect, s.form) for s in found.steps] == [("drive_saturation", "hard")]
     sharpness = next(e for e in found.after.estimates if e.name == "drive_saturation.sharpness")
     assert sharpness.value == pytest.approx(1.0 / 0.4, rel=5e-3)

@@ -79,10 +79,10 @@ def test_the_flexible_link_is_cut_at_12_s(call, tmp_path):
 
 
 def test_files_that_are_not_there_are_named(call, tmp_path):
-    code, said = call("quarter_drone/make_campaign.py", "--data", tmp_path, "--out", tmp_path / "out")
+    code, output = call("quarter_drone/make_campaign.py", "--data", tmp_path, "--out", tmp_path / "out")
     assert code == 2
-    assert re.search(r"error: .*(does not exist|No such file)", said)
-    assert "Traceback" not in said
+    assert re.search(r"error: .*(does not exist|No such file)", output)
+    assert "Traceback" not in output
     assert not (tmp_path / "out").exists()
 
 

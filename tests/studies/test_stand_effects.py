@@ -60,11 +60,11 @@ def test_two_ways_to_say_the_same_agree(one: dict[str, float], other: dict[str, 
 def test_friction_takes_energy_out_at_any_state() -> None:
     named = ({"coulomb": 40.0, "coulomb_tanh": 1.0}, {"stribeck": 40.0, "stribeck_exponent": 1.0},
              {"seal_friction": 300.0}, {"asymmetric_friction": 40.0})  # fmt: skip
-    for told in named:
-        assert all(friction(ARM, Effects(**told), now) * now["speed"] > 0.0 for now in states()), told
-    for told in ({"cam_bump": 60.0}, {"piston_stiction": 800.0}, {"pressure_friction": 0.1}):
-        effects = Effects(**told)
-        assert all(unlisted_torque(ARM, effects, now, -0.8, 400.0) * now["speed"] <= 0.0 for now in states()), told
+    for sizes in named:
+        assert all(friction(ARM, Effects(**sizes), now) * now["speed"] > 0.0 for now in states()), sizes
+    for sizes in ({"cam_bump": 60.0}, {"piston_stiction": 800.0}, {"pressure_friction": 0.1}):
+        effects = Effects(**sizes)
+        assert all(unlisted_torque(ARM, effects, now, -0.8, 400.0) * now["speed"] <= 0.0 for now in states()), sizes
 
 
 def test_friction_of_either_direction_has_its_own_size() -> None:

@@ -80,8 +80,8 @@ def test_a_full_disk_is_told_and_harms_nothing(start, write_study, tmp_path, sma
 
 @pytest.mark.skipif(not os.path.isdir("/sys/kernel"), reason="/sys is a folder in which nobody can write")
 def test_a_folder_that_cannot_be_written_is_told(refused, write_study):
-    told = refused("study", write_study(), "--quiet", "--out", "/sys/kernel/armid")
-    assert "/sys/kernel/armid cannot be used" in told
+    message = refused("study", write_study(), "--quiet", "--out", "/sys/kernel/armid")
+    assert "/sys/kernel/armid cannot be used" in message
 
 
 def test_a_read_only_folder_can_be_read_and_is_told_when_written(write_study, small_disk, undisturbed):
@@ -129,8 +129,8 @@ def test_identifiers_that_misbehave_fail_alone(write_study, tmp_path, bad_identi
     }
     bad = "\n[[identifiers]]\n".join(f'name = "{name}"\nnoise_deg_s = 0.3' for name in errors)
     plugins = [f"{bad_identifiers}:{name}" for name in errors]
-    told = {"jobs": 2, "out": tmp_path / "out", "plugins": plugins, "only": "row 1", "time_limit": 10.0}
-    found = run_study(write_study(1, change=(CHAIN, bad)), **told)
+    options = {"jobs": 2, "out": tmp_path / "out", "plugins": plugins, "only": "row 1", "time_limit": 10.0}
+    found = run_study(write_study(1, change=(CHAIN, bad)), **options)
     failed = found.runs[found.runs["status"] == "failed"].set_index("identifier")["error"]
     assert {name: words for name, words in errors.items() if words in failed[name]} == errors
     done = found.runs[found.runs["status"] == "done"]["run"]
@@ -138,7 +138,7 @@ def test_identifiers_that_misbehave_fail_alone(write_study, tmp_path, bad_identi
     assert set(done) < set(undisturbed.runs["run"])
     assert found.study["n_failed"] == len(errors)
     # they have failed, and are not tried again unless someone asks for it
-    assert run_study(write_study(1, change=(CHAIN, bad)), **told).runs.equals(found.runs)
+    assert run_study(write_study(1, change=(CHAIN, bad)), **options).runs.equals(found.runs)
 
 
 @pytest.mark.parametrize(("name", "words"), [

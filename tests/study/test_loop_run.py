@@ -62,7 +62,7 @@ def n_kept(out):
 
 
 def test_a_kill_loses_nothing_and_the_loop_never_opens_the_key(start, closed, suite, tmp_path):
-    """A pipe in the place of the key blocks for ever whoever opens it."""
+    """A pipe where the key should be blocks for ever who opens it."""
     without_key = shutil.copytree(suite, tmp_path / "copy", ignore=shutil.ignore_patterns("out", "suite.key.json"))
     os.mkfifo(without_key / "suite.key.json")
     out = without_key / "out"

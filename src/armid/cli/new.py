@@ -358,7 +358,8 @@ def new_headers(roles: Mapping[str, Column], linear: bool, notes: list[str]) -> 
             continue
         begin, ends, usual = HEADERS[quantity, linear]
         end = column.end if column.end in ends else usual
-        headers[quantity] = CURRENT if quantity == "drive" and end == "A" else f"{begin}_{end}" if end else COMMAND
+        names_of_drive = {("drive", "A"): CURRENT, ("drive", ""): COMMAND}
+        headers[quantity] = names_of_drive.get((quantity, end), f"{begin}_{end}")
         guess = "" if end in ("", column.end) else f"; GUESS: its unit, which the header does not tell, is {end}"
         times = "" if column.factor == 1.0 else f", its numbers times {column.factor:g}"
         notes.append(f"{headers[quantity]}: the column {quoted(column.header)}{times}{guess}")

@@ -171,7 +171,7 @@ def expand_all(exploration: Exploration, most: int | None) -> bool:
         complete(exploration, model)
         # Near the noise a second name must not stand for a shape of the first that was held.
         for less in simpler(exploration, model) if is_near(exploration) else []:
-            if says_little(exploration, less):
+            if may_be_far_off(exploration, less):
                 complete(exploration, less)
         if next_model(exploration) == model:
             expand(exploration, model)
@@ -539,11 +539,11 @@ def finish_all(exploration: Exploration) -> None:
                 and not is_outdone(m, value, ranked)]  # fmt: skip
         best, top = ranked[0]
         todo += [m for m in simpler(exploration, best)
-                 if not is_complete(exploration, m) and says_little(exploration, m)]  # fmt: skip
+                 if not is_complete(exploration, m) and may_be_far_off(exploration, m)]  # fmt: skip
         # A name must not stand for its twin, whose rough fit may be far from its estimate.
         twins = [m for m, value in ranked if len(m) == len(best) and len(m - best) == 1 and value > top - HOPELESS]
         todo += [m for m in twins[:N_TWINS]
-                 if m not in todo and not is_complete(exploration, m) and says_little(exploration, m)]  # fmt: skip
+                 if m not in todo and not is_complete(exploration, m) and may_be_far_off(exploration, m)]  # fmt: skip
         if not todo:
             break
         for model in todo:
@@ -559,10 +559,10 @@ def simpler(exploration: Exploration, model: Hypotheses) -> list[Hypotheses]:
     return sorted(less, key=lambda m: -exploration.log_posterior(m))
 
 
-def says_little(exploration: Exploration, model: Hypotheses) -> bool:
-    """Tell whether a rough fit of a model says little.
+def may_be_far_off(exploration: Exploration, model: Hypotheses) -> bool:
+    """Tell whether a rough fit of a model may be far from its estimate.
 
-    So it is where an effect has a shape that its declaration holds, or records start as they do in another model.
+    That holds where an effect has a shape that its declaration holds, or records start as they do in another model.
     """
     fit = exploration.fits[model]
     return fits_starts(fit.records.replays) or any(exploration.library.fixed_shapes(key) for key in fit.active)

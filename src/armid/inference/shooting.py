@@ -10,10 +10,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
 
-from armid.estimation.least_squares import with_fitted_starts
 from armid.inference.library import Library
 from armid.inference.model import Fit, accurate, fit_from, start_of, with_own_starts
-from armid.inference.whitening import recut
 from armid.model import Plant
 from armid.problem.problem import by_record
 from armid.record import Piece, Record
@@ -34,8 +32,6 @@ def on_short_pieces(library: Library, declared: Fit) -> tuple[Library, Fit] | No
     if n_parts == 1:
         return None
     short = cut_library(library, n_parts, {})
-    problem = short.problem((), declared.values)
-    short = short.about(with_fitted_starts(problem.replays, problem.space))
     return short, accurate(fit_from(short.problem((), declared.values), (), [declared.z]), short)
 
 
@@ -72,7 +68,8 @@ def cut_library(library: Library, n_parts: int, starts: Starts) -> Library:
     plant, data = library.declared.plant, library.data
     if n_parts > 1:
         data = library.as_read or data
-        data = recut(data, tuple(cut(record, n_parts, plant) for record in data.records))
+        data = replace(data, records=tuple(cut(record, n_parts, plant) for record in data.records))
+        data = data.with_levels(data.levels)
     records = tuple(restarted(record, starts) for record in data.records)
     as_read = library.as_read if n_parts == 1 else None
     return replace(library.with_data(replace(data, records=records), as_read), _schedules={})

@@ -313,7 +313,7 @@ def columns_about(
     steps = UNKNOWN_STEP * np.eye(len(values))[stepped]
     points = np.vstack([values - steps, values + steps])
     below, above = np.split(residuals_at(base, unknowns, points, np.tile(z, (len(points), 1))), 2)
-    # a constant whose slope bends could be told apart from a parameter that does the same
+    # one-sided differences of a curved answer would separate a constant from a parameter that does the same
     by_steps = dict(zip(stepped, (below - above) / (2.0 * UNKNOWN_STEP), strict=True))
 
     def column(i: int, unknown: Unknown) -> Array:

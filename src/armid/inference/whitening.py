@@ -276,13 +276,6 @@ def whitened(records: Sequence[Record], plant: Plant, trained: WhitenedData | No
     return with_standstills(WhitenedData(tuple(records), levels, soundness_of(each, levels)))
 
 
-def recut(data: WhitenedData, records: tuple[Record, ...]) -> WhitenedData:
-    """Return data whose records have other pieces, with the noise of theirs."""
-    each = tuple(one for r in records for one in r.each)
-    again = WhitenedData(records, data.levels, soundness_of(each, data.levels), data.estimates)
-    return with_standstills(again)
-
-
 def soundness_of(each: Sequence[Record], levels: Sequence[NoiseModel]) -> Array:
     return np.concatenate([soundness(r, len(level.terms)) for r, level in zip(each, levels, strict=True)])
 

@@ -69,9 +69,13 @@ def answers_to_start(piece: Piece) -> list[Array]:
     answer = piece.correction
     if answer is None:
         return []
-    widths = WIDER_START * np.array([piece.start_deviation[name] for name in piece.shown_start])
     pairs = zip(answer.slopes.swapaxes(0, 1), answer.samples, strict=True)
-    return [(widths * slopes.T)[samples] for slopes, samples in pairs]
+    return [(reach_of_start(piece) * slopes.T)[samples] for slopes, samples in pairs]
+
+
+def reach_of_start(piece: Piece) -> Array:
+    """Return how far a fit may move each start constant from what the reader saw, SI, (n_constants,)."""
+    return WIDER_START * np.array([piece.start_deviation[name] for name in piece.shown_start])
 
 
 def likely_candidate(replays: Sequence[Replay], space: Space) -> Array:
@@ -162,9 +166,7 @@ class Start:
     @cached_property
     def shown(self) -> tuple[Array, Array]:
         """The start that the reader saw, and how far from it the fit may go, SI, both (n_constants,)."""
-        piece = self.piece
-        deviations = np.array([piece.start_deviation[name] for name in self.names])
-        return np.array(list(piece.shown_start.values())), WIDER_START * deviations
+        return np.array(list(self.piece.shown_start.values())), reach_of_start(self.piece)
 
     def beyond(self, residual: Array, slopes: Array) -> Array:
         """Return what no start can do of a residual, (n_seen,), infinite where the simulation diverges."""

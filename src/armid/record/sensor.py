@@ -149,6 +149,10 @@ MEMORIES, DISTINCT, LONGEST_MEMORY = np.linspace(-0.5, 0.95, 146), 3.0, 0.8
 # By how much a longer rest of an input is tried. A measured input passes so many steps, and changes in such a share of
 # the samples.
 LONGER_REST, FEWEST_STEPS, CHANGING = 1.25, 16, 0.1
+# Correlation of neighbours among second differences of white noise, and how far that of 50 of them may be from it; the
+# least median of their squares, in the mean (of a normal noise 0.45); the largest noise of an input, as a share of how
+# far the input moves.
+WHITE_BENDS, WHITENESS, SPREAD_OF_NOISE, LARGEST_NOISE = -2.0 / 3.0, 0.2, 0.2, 0.2
 # Independent samples of a rest that tell its noise.
 FEWEST_INDEPENDENT = 12.0
 # Values farther out than this many standard deviations are no noise.
@@ -418,10 +422,6 @@ LEAP = 2.0
 # A signal that runs into the limit of its sensor gets there at no less than this share of its usual rate, over so many
 # samples, and leaves it so: a machine that ends at rest or at an even speed slows down before.
 ABRUPT, RUN_UP = 0.2, 4
-# Correlation of neighbours among second differences of white noise, and how far that of 50 of them may be from it; the
-# least median of their squares, in the mean (of a normal noise 0.45); the largest noise of an input, as a share of how
-# far the input moves.
-WHITE_BENDS, WHITENESS, SPREAD_OF_NOISE, LARGEST_NOISE = -2.0 / 3.0, 0.2, 0.2, 0.2
 
 
 @dataclass(frozen=True)
