@@ -1,4 +1,4 @@
-"""Expected running times, ECDFs over runs and targets, data profiles, medians of convergence, lines with names."""
+"""Expected running times, ECDFs over runs and targets, waterfalls, medians of convergence, lines with names."""
 
 from types import SimpleNamespace
 
@@ -11,11 +11,9 @@ from armid.report.style import MOST_COLOURED, PALE, named_lines, panels
 from armid.study.analyses.analysis import TARGETS
 from armid.study.analyses.convergence import convergence_figure, median
 from armid.study.analyses.running_time import (
-    data_profile,
     ecdf_figure,
     expected_running_time,
     running_time,
-    running_time_figure,
     share_hit,
     waterfall_figure,
 )
@@ -51,17 +49,13 @@ def test_table_takes_the_tolerances_and_counts_hits():
     assert frame.loc[0, "0.1 %"] == "inf (0 %)"
 
 
-def test_lines_end_where_no_run_hits_and_are_named_in_the_order_of_their_colours():
+def test_lines_are_named_in_the_order_of_their_colours():
     hits = np.full((4, 51), np.inf)
     hits[:, :10], hits[:2, :30] = 5.0, 7.0
     evidence = SimpleNamespace(
         groups={"s": {"near": np.array([2, 3]), "far": np.array([0, 1])}}, colours={"near": 0, "far": 1},
-        used=np.full(4, 9.0), histories=SimpleNamespace(grid=np.array([1, 10, 100]), error_hits=hits),
+        histories=SimpleNamespace(grid=np.array([1, 10, 100]), error_hits=hits),
     )  # fmt: skip
-    figure = running_time_figure(evidence, hits, TARGETS, "error")
-    assert [t.get_text() for t in figure.axes[0].texts] == ["near", "far"]
-    assert [np.isfinite(line.get_ydata()).sum() for line in figure.axes[0].lines[:2]] == [30, 10]
-    plt.close(figure)
     figure = ecdf_figure(evidence)
     assert [t.get_text() for t in figure.axes[0].texts] == ["near", "far"]
     assert figure.axes[0].get_ylim() == (0.0, 1.0)
@@ -77,11 +71,6 @@ def test_the_first_six_lines_have_a_colour_each_and_all_others_are_grey():
     assert [colours[i] for i in (0.0, 1.0, 2.0)] == [PALE] * 3
     assert len({colours[float(i)] for i in range(3, 9)}) == MOST_COLOURED
     plt.close(figure)
-
-
-def test_data_profile_by_hand():
-    hits, n = np.array([10.0, 50.0, np.inf]), np.array([4, 4, 9])
-    assert data_profile(hits, n, np.array([1.0, 2.0, 9.9, 10.0, 1e9])) == pytest.approx([0, 1 / 3, 1 / 3, 2 / 3, 2 / 3])
 
 
 def test_a_waterfall_rises_to_what_the_worst_run_leaves():

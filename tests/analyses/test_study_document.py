@@ -122,7 +122,7 @@ def test_what_cannot_be_reported_is_refused(made, tmp_path):
     ({"noises": (0.3,), "identifiers": {"pso": 1e-3}, "failed": 1}, {"overview", "ecdf", "runs"}),
     ({"noises": (0.0,), "identifiers": {"pso": 1e-3, "de": 1e-2}, "fitness": ("rmse", "similarity")},
      {"fitness", "convergence_rmse"}),
-    ({"noises": (0.3,), "windows": ("0-0.7 s", "whole"), "report": "table2"}, {"table2", "table2_records"}),
+    ({"noises": (0.3,), "windows": ("0-0.7 s", "whole"), "report": "table2"}, {"table2", "table_ii_as_printed"}),
 ])  # fmt: skip
 def test_studies_of_other_shapes(made, change, there):
     assert there <= drawn(made(cases=PAPER_CASES[:2], seeds=1, **change))
@@ -139,7 +139,7 @@ def test_all_runs_failed(made, tmp_path):
 def test_without_a_truth_there_are_values_and_costs_and_no_errors(made):
     results = without_truth(made(cases=PAPER_CASES[:2], seeds=2))
     names = drawn(results)
-    assert {"values", "fixed_target", "data_profile", "convergence_fitness"} <= names
+    assert {"values", "fixed_target", "waterfall", "convergence_fitness"} <= names
     assert not {"success", "ecdf", "valley", "overview", "error_map", "ranks"} & names
     document = report_of(results)
     assert "Records of campaigns/mine." in document.facts

@@ -3,8 +3,7 @@
 The expected running time is what one success costs when a method is started again until it has one.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
-from itertools import product
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -33,26 +32,17 @@ ECDF_CAPTION = (
     "the best candidate so far (by fitness) is first that near to the truth. Your own identifiers and the best have "
     "a colour, the others are grey. A run that stops early stays where it ended."
 )
-FIGURE_CAPTION = (
-    "Simulations that one success costs on average when a method is started again until it has one: those of all runs "
-    "until the target is first hit (all that were used where it is not), divided by the number of runs that hit. A "
-    "line ends at the strictest target that any run hit. Your own identifiers and the best have a colour."
-)
 
 
 def parts(evidence: Evidence) -> Sequence[Part]:
     if not evidence.knows_truth:
         return ()
-    hits = evidence.histories.error_hits
     shown = {f"{100 * t:g} %": t for t in SUCCESS_TOLERANCES}
-    label = "largest relative error of the best candidate [%]"
     title = "Expected running time to the truth [simulations]"
     return (
-        running_time(evidence, hits, shown, "running_time", title, TARGET),
+        running_time(evidence, evidence.histories.error_hits, shown, "running_time", title, TARGET),
         Figure("ecdf", "ECDF over targets", ECDF_CAPTION, lambda: ecdf_figure(evidence)),
-        Figure("running_time", "Expected running time", FIGURE_CAPTION,
-               lambda: running_time_figure(evidence, hits, 100.0 * TARGETS, label)),
-    )  # fmt: skip
+    )
 
 
 RUNNING_TIME = Analysis("running_time", "Cost of the truth", parts, "simulations until the parameters are right")
@@ -106,34 +96,15 @@ def ecdf_figure(evidence: Evidence) -> Any:
 
 
 def line_panels(
-    curves: Sequence[tuple[str, ArrayLike, Mapping[str, Array]]], colours: Mapping[str, int], columns: int = 2,
-    width: float = 7.8, **axes: Any,
-) -> Any:  # fmt: skip
+    curves: Sequence[tuple[str, ArrayLike, Mapping[str, Array]]], colours: Mapping[str, int], **axes: Any
+) -> Any:
     """Draw one panel each with a line for each identifier. curves: title, x, and name -> y; axes: scales and labels."""
-    figure, cells = panels(len(curves), columns, width, LEAST_HEIGHT)
+    figure, cells = panels(len(curves), 2, 7.8, LEAST_HEIGHT)
     for axis, (title, x, lines) in zip(cells, curves, strict=True):
         axis.set(title=title, **axes)
         named_lines(axis, x, lines, colours)
         axis.grid(alpha=0.3)
     return figure
-
-
-def running_time_figure(evidence: Evidence, hits: Array, targets: Array, label: str) -> Any:
-    """Draw one panel a setting and one line a variant; a line ends where no run hits the target."""
-    curves = []
-    for setting, variants in evidence.groups.items():
-        lines = {v: expected_running_time(hits[rows], evidence.used[rows])[0] for v, rows in variants.items()}
-        curves.append((setting, targets, {v: np.where(np.isfinite(ert), ert, np.nan) for v, ert in lines.items()}))
-    limits = powers_around(line for *_, lines in curves for line in lines.values())
-    return line_panels(curves, evidence.colours, xscale="log", yscale="log", xlim=(targets[0], targets[-1]),
-                       ylim=limits, xlabel=label, ylabel="expected running time [simulations]")  # fmt: skip
-
-
-def powers_around(lines: Iterable[Array]) -> tuple[float, float]:
-    finite = np.concatenate([y[np.isfinite(y)] for y in lines])
-    if not finite.size:
-        return 1.0, 10.0
-    return 10.0 ** np.floor(np.log10(finite.min())), 10.0 ** np.ceil(np.log10(finite.max()) + 1e-9)
 
 
 # Parts of the way to the best known value that may be left.
@@ -144,63 +115,26 @@ BEST_TARGET = (
     "fitness that any identifier found on the same case, noise and seed, no more than this share is left. Where "
     "several fitnesses were run, each is compared with its own kind."
 )
-PROFILE_CAPTION = (
-    "Share of the problems (a case with its noise and seed) that are solved within so many simplex gradients, that is "
-    "simulations divided by one more than the number of free parameters. Solved: no more than the share in the title "
-    "is left of the way from a first candidate to the best fitness that anyone found (More and Wild 2009). Each "
-    "fitness is compared with its own kind only."
-)
-LEFT_LABEL = "share of the way to the best known fitness that is left"
 WATERFALL_CAPTION = (
     "What each run leaves of the way from a first candidate to the best known fitness when it ends, sorted: a seed is "
     "a start. A flat step above the lowest one is a local minimum that many starts end in; 1e-10 and below are alike."
-)
-BEST_FIGURE_CAPTION = (
-    "Expected running time with targets of the fitness: what is left of the way from a first candidate (median over "
-    "all runs on the case) to the best fitness that anyone found on the same case, noise and seed."
 )
 
 
 def best_fitness_parts(evidence: Evidence) -> Sequence[Part]:
     if evidence.parameters.empty:
         return ()
-    hits = evidence.histories.value_hits
     shown = {f"{t:g} left": t for t in SHARES_LEFT}
-    title = "Expected running time to the best known fitness"
+    title = "Expected running time to the best known fitness [simulations]"
     return (
-        running_time(evidence, hits, shown, "fixed_target", f"{title} [simulations]", BEST_TARGET),
+        running_time(evidence, evidence.histories.value_hits, shown, "fixed_target", title, BEST_TARGET),
         Figure("waterfall", "Waterfall of starts", WATERFALL_CAPTION, lambda: waterfall_figure(evidence)),
-        Figure("data_profile", "Data profiles", PROFILE_CAPTION, lambda: data_profile_figure(evidence)),
-        Figure(
-            "fixed_target", title, BEST_FIGURE_CAPTION, lambda: running_time_figure(evidence, hits, TARGETS, LEFT_LABEL)
-        ),
     )
 
 
 BEST_FITNESS = Analysis(
     "best_fitness", "Cost of the best fitness", best_fitness_parts, "simulations until the fitness is best"
 )
-
-
-def data_profile(hits: Array, n_parameters: NDArray[np.integer[Any]], grid: Array) -> Array:
-    """Return the share of problems solved within each number of simplex gradients, (n_grid,).
-
-    d(kappa) = #{p : h_p <= kappa (n_p + 1)} / n_problems. hits: of one tolerance, (n_problems,); grid: kappa.
-    Source: More and Wild, SIAM J. Optim. 20 (2009) 172, Eq. 2.5.
-    """
-    return share_hit(hits / (n_parameters + 1), grid)
-
-
-def data_profile_figure(evidence: Evidence) -> Any:
-    kept, n_free, columns, curves = evidence.histories, evidence.n_free, len(SHARES_LEFT), []
-    for (setting, variants), share in product(evidence.groups.items(), SHARES_LEFT):
-        place = int(np.flatnonzero(share * (1.0 + 1e-9) >= TARGETS)[0])
-        least = min(int(n_free[rows].min()) for rows in variants.values()) + 1
-        grid = np.geomspace(1.0, int(kept.grid[-1]) / least, N_OF_TIMES)
-        lines = {v: data_profile(kept.value_hits[rows, place], n_free[rows], grid) for v, rows in variants.items()}
-        curves.append((f"{setting}, {share:g} left", grid, lines))
-    return line_panels(curves, evidence.colours, columns, 6.6, xlabel="simulations / (free parameters + 1)",
-                       ylabel="share of problems solved", **SHARE_AXES)  # fmt: skip
 
 
 def waterfall_figure(evidence: Evidence) -> Any:

@@ -1,35 +1,24 @@
 """Success rates: how often all parameters end within a tolerance of the truth."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 from pandas import DataFrame, concat
 
-from armid.report.document import Column, Figure, Part, Table
-from armid.report.style import draw_intervals, legend_below, mark_handles, panels, row_names
+from armid.report.document import Column, Part, Table
 from armid.study.analyses.analysis import N_RUNS, SETTING, VARIANT, Analysis, Evidence
 
 SUCCESS_TOLERANCES = (1e-2, 1e-3, 1e-4)
-# Distance of two tolerances in a row of the figure.
-BARS_APART = 0.24
 TABLE_CAPTION = (
     "A run succeeds when the relative errors of all parameters of its result are within the tolerance; a failed run "
     "does not. In brackets the 95 % Wilson interval of the rate. Runs of all cases and seeds count alike."
-)
-FIGURE_CAPTION = (
-    "Share of the runs in which the relative errors of all parameters are within 1 %, 0.1 % and 0.01 % at the end, "
-    "with 95 % Wilson intervals; the most successful identifier on top. A colour is an identifier, a mark a "
-    "tolerance."
 )
 
 
 def parts(evidence: Evidence) -> Sequence[Part]:
     if not evidence.knows_truth:
         return ()
-    rates = success_rates(concat([evidence.of(setting) for setting in evidence.settings]))
-    return success(rates), Figure("success", "Success rates", FIGURE_CAPTION,
-                                   lambda: success_figure(rates, evidence.colours))  # fmt: skip
+    return (success(success_rates(concat([evidence.of(setting) for setting in evidence.settings]))),)
 
 
 SUCCESS = Analysis("success", "Success rates", parts, "share of runs with all parameters within 1, 0.1 and 0.01 %")
@@ -69,20 +58,3 @@ def success(rates: DataFrame) -> Table:
             frame[f"{name}_{key}"] = own[key].to_numpy()
         columns.append(Column(f"{name}_text", f"within {percent} % [% of runs]"))
     return Table("success", "Success rates", TABLE_CAPTION, frame, tuple(columns))
-
-
-def success_figure(rates: DataFrame, colours: Mapping[str, int]) -> Any:
-    settings = list(dict.fromkeys(rates["setting"]))
-    means = rates.groupby("variant", sort=False)["rate"].mean()
-    variants = [str(v) for v in means.sort_values(ascending=False, kind="stable").index]
-    figure, axes = panels(len(settings), 2, 6.8, 1.6 + 0.36 * len(variants))
-    for i, (axis, setting) in enumerate(zip(axes, settings, strict=True)):
-        for j, (_, own) in enumerate(rates[rates["setting"] == setting].groupby("tolerance", sort=False)):
-            heights = own["variant"].map({v: k for k, v in enumerate(variants)}).to_numpy(float) + BARS_APART * (j - 1)
-            rate, low, high = (100.0 * own[key].to_numpy() for key in ("rate", "low", "high"))
-            draw_intervals(axis, rate, heights, low, high, j, own["variant"].map(colours))
-        row_names(axis, i, variants)
-        axis.set(ylim=(len(variants) - 0.5, -0.5), xlim=(-2, 102), xlabel="runs that succeed [%]", title=setting)
-        axis.grid(axis="x", alpha=0.4)
-    legend_below(figure, 3, mark_handles(f"within {100 * t:g} %" for t in dict.fromkeys(rates["tolerance"])))
-    return figure

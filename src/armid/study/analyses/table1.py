@@ -156,15 +156,14 @@ def one_row(group: DataFrame) -> dict[str, object]:
 
 
 def percentile_among(errors: ArrayLike, published: float) -> float:
-    """Return the percentage of errors below a published one, equal ones by half; NaN for an empty sample."""
+    """Return the percentage of errors below a published one, equal ones by half."""
     from scipy.stats import percentileofscore
 
-    sample = np.asarray(errors, np.float64)
-    return float(percentileofscore(sample, published, kind="mean")) if sample.size else np.nan
+    return float(percentileofscore(np.asarray(errors, np.float64), published, kind="mean"))
 
 
-def median_interval(values: ArrayLike, confidence: float = 0.95, seed: int = 0) -> tuple[float, float]:
-    """Return the percentile bootstrap interval of the median; values may be infinite, fewer than two give NaN.
+def median_interval(values: ArrayLike) -> tuple[float, float]:
+    """Return the 95 % percentile bootstrap interval of the median; fewer than two values give NaN.
 
     Source: Efron and Tibshirani, An Introduction to the Bootstrap (1993), ch. 13.
     """
@@ -173,18 +172,11 @@ def median_interval(values: ArrayLike, confidence: float = 0.95, seed: int = 0) 
     sample = np.sort(np.asarray(values, np.float64))
     if sample.size < 2:
         return np.nan, np.nan
-    # ranks instead of values where some are infinite: the bootstrap subtracts, and inf - inf is not a number
-    finite = bool(np.isfinite(sample).all())
-    resampled = sample if finite else np.arange(sample.size, dtype=np.float64)
     interval = bootstrap(
-        (resampled,), np.median, n_resamples=RESAMPLES, batch=max(1, BATCH_NUMBERS // sample.size),
-        confidence_level=confidence, method="percentile", rng=np.random.default_rng(seed),
+        (sample,), np.median, n_resamples=RESAMPLES, batch=max(1, BATCH_NUMBERS // sample.size),
+        method="percentile", rng=np.random.default_rng(0),
     ).confidence_interval  # fmt: skip
-    if finite:
-        return float(interval.low), float(interval.high)
-    # between two ranks the mean of their values
-    low, high = (float(sample[[int(np.floor(r)), int(np.ceil(r))]].mean()) for r in (interval.low, interval.high))
-    return low, high
+    return float(interval.low), float(interval.high)
 
 
 def table1_figure(estimates: DataFrame, published: DataFrame, colours: Mapping[str, int]) -> Any:

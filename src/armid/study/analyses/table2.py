@@ -46,7 +46,7 @@ def parts(evidence: Evidence) -> Sequence[Part]:
     figure = Figure("table2", "Repeated identifications beside the paper's", FIGURE_CAPTION,
                     lambda: table2_figure(estimates, published, evidence.colours))  # fmt: skip
     layout = paper_layout(evidence, "Table II", with_truth=False)
-    return layout, table2(estimates, published), table2_records(estimates), figure
+    return layout, table2(estimates, published), figure
 
 
 TABLE2 = Analysis("table2", "Table II of the paper beside ours", parts, "mean and spread, where the study asks for it")
@@ -85,17 +85,6 @@ def one_row(group: DataFrame) -> dict[str, object]:
         "within": float(np.sqrt(np.mean([r["deviation"] ** 2 for r in records]))), "bound": group["deviation"].median(),
         "low": group["low"].iloc[0], "high": group["high"].iloc[0], "n_at_bound": int(group["at_bound"].sum()),
     }  # fmt: skip
-
-
-def table2_records(estimates: DataFrame) -> Table:
-    keys = ["setting", "variant", "case", "parameter", "unit"]
-    rows = [
-        dict(zip(keys, k, strict=True)) | spread(g["value"])
-        | {"bound": g["deviation"].median(), "n_at_bound": int(g["at_bound"].sum())}
-        for k, g in estimates.groupby(keys, sort=False)
-    ]  # fmt: skip
-    columns = (*(Column(k, k) for k in keys), *(Column(k, k, ".6g") for k in ("n", "mean", "deviation", "bound")))
-    return Table("table2_records", "Table II, record by record", TABLE_CAPTION, DataFrame(rows), columns, most=0)
 
 
 def spread(values: ArrayLike) -> dict[str, float]:
