@@ -121,6 +121,5 @@ def test_the_effect_size_is_the_mann_whitney_statistic_over_the_pairs(x, y):
 
 def test_effect_sizes_by_hand_with_a_tie_and_a_failure():
     assert a12([1.0, 2.0], [2.0, np.inf]) == (2 + 1.5) / 4
-    assert np.isnan(a12([], [1.0]))
     words = [size_in_words(value) for value in (0.5, 0.44, 0.57, 0.65, 0.28, 1.0)]
     assert words == ["negligible", "small", "small", "medium", "large", "large"]

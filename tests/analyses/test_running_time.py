@@ -19,6 +19,10 @@ from armid.study.analyses.running_time import (
 )
 
 
+def named(axis):
+    return [text.get_text() for text in axis.get_legend().get_texts()]
+
+
 def test_share_hit_by_hand():
     hits = np.array([[1.0, 10.0], [5.0, np.inf]])
     assert share_hit(hits, np.array([1, 4, 5, 10, 99])).tolist() == [0.25, 0.25, 0.5, 0.75, 0.75]
@@ -57,7 +61,7 @@ def test_lines_are_named_in_the_order_of_their_colours():
         histories=SimpleNamespace(grid=np.array([1, 10, 100]), error_hits=hits),
     )  # fmt: skip
     figure = ecdf_figure(evidence)
-    assert [t.get_text() for t in figure.axes[0].texts] == ["near", "far"]
+    assert named(figure.axes[0]) == ["near", "far"]
     assert figure.axes[0].get_ylim() == (0.0, 1.0)
     plt.close(figure)
 
@@ -66,7 +70,7 @@ def test_the_first_six_lines_have_a_colour_each_and_all_others_are_grey():
     figure, (axis,) = panels(1, 1, 5.0, 4.6)
     lines = {f"v{i}": [0.0, float(i)] for i in range(9)}
     named_lines(axis, [1.0, 2.0], lines, {name: 8 - i for i, name in enumerate(lines)})
-    assert [t.get_text() for t in axis.texts] == ["v8", "v7", "v6", "v5", "v4", "v3", "others (3)"]
+    assert named(axis) == ["v8", "v7", "v6", "v5", "v4", "v3", "others (3)"]
     colours = {line.get_ydata()[1]: line.get_color() for line in axis.lines[:9]}
     assert [colours[i] for i in (0.0, 1.0, 2.0)] == [PALE] * 3
     assert len({colours[float(i)] for i in range(3, 9)}) == MOST_COLOURED
@@ -99,7 +103,7 @@ def test_one_panel_a_setting_with_a_line_a_variant_and_runs_of_another_fitness_l
     values = np.array([[np.inf, 1.0, 1e-12], [2.0, 0.5, 1e-3]] * 4)
     figure = convergence_figure(evidence, np.arange(8) < 6, values, "error", floor=1e-6)
     assert [axis.get_title() for axis in figure.axes] == ["noise-free", "0.3 deg/s"]
-    assert [t.get_text() for t in figure.axes[0].texts] == ["pso", "de", "ga"]
+    assert named(figure.axes[0]) == ["pso", "de", "ga"]
     _, de, pso = (line.get_ydata() for line in figure.axes[0].lines[:3])
     assert np.nanmin(pso) == 1e-6
     # a line ends where the budget does

@@ -3,11 +3,9 @@
 import errno
 import os
 import shutil
-import sqlite3
 import subprocess
 import sys
 import time
-from contextlib import closing
 
 import pytest
 from small_study import RUNS_A_SEED, beside_cost, same_results
@@ -124,7 +122,7 @@ def test_identifiers_that_misbehave_fail_alone(write_study, tmp_path, bad_identi
         "leaves": "SystemExit: 3",
         "segfaults": "the worker process ended by SIGSEGV, 2 times",
         "interrupts": "the worker process ended with code 130, 2 times",
-        "writes": "what came from the worker process is not a message of ours",
+        "writes": "the worker process sent what is not a message of ours",
         "hangs": "stopped at the time limit of 10 s",
     }
     bad = "\n[[identifiers]]\n".join(f'name = "{name}"\nnoise_deg_s = 0.3' for name in errors)
@@ -162,15 +160,6 @@ def test_a_damaged_page_is_told(undisturbed, tmp_path):
         (tmp_path / FILE_NAME).write_bytes(content)
         with pytest.raises(ArmidError, match=r"study\.sqlite (is damaged|cannot be used)"):
             load_study(tmp_path)
-
-
-def test_a_run_that_was_cut_off_is_made_again(write_study, undisturbed, tmp_path):
-    """An earlier version kept runs whose worker was interrupted."""
-    shutil.copytree(undisturbed.path.parent, tmp_path / "out")
-    with closing(sqlite3.connect(tmp_path / "out" / FILE_NAME)) as store:
-        store.execute("UPDATE identified SET used = 7, stopped = 'interrupted' WHERE used = 40")
-        store.commit()
-    assert same_results(run_study(write_study(SEEDS), jobs=1, out=tmp_path / "out"), undisturbed)
 
 
 @pytest.mark.slow
@@ -214,7 +203,7 @@ def test_a_fault_of_the_machine_marks_no_run(error, of_the_machine, monkeypatch)
 
 def test_a_worker_that_cannot_start_is_told(write_study, tmp_path, monkeypatch):
     monkeypatch.setattr("sys.executable", "/bin/false")
-    with pytest.raises(ArmidError, match="a worker process cannot start: it ends with code 1"):
+    with pytest.raises(ArmidError, match="a worker process cannot start: it ended with code 1"):
         run_study(write_study(), jobs=1, out=tmp_path / "out")
 
 

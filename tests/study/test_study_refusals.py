@@ -42,13 +42,13 @@ REFUSED = [
      "needs residual vectors, fitness 'similarity' has none: rmse or likelihood is expected"),
     ('name = "pso+least_squares"', 'name = "pso+least_squares"\nfitness = "likelihood"',
      "fitness 'likelihood' needs noise, but noise_deg_s holds 0"),
-    ("[[0.0, 0.3]]", "[[0.29, 0.7]]", "window [0.29, 0.7] holds 11 samples of a manoeuvre of 0.3 s, at least 20"),
+    ("[[0.0, 0.3]]", "[[0.29, 0.7]]", "case 'row 1', manoeuvre 1: the window holds 11 samples of manoeuvre 1"),
     ("start_angle_deg = -48.0", "start_angle_deg = -60.0", "case 'row 1', manoeuvre 1: start_angle_deg is -60"),
     ('"row 5"', '"row 1"', "case 'row 1' is there twice"),
     ('fitness = "rmse"', 'fitness = ["rmse", "rmse"]', "the same run is asked for twice (fitness rmse, window"),
     ('"row 5"', '"row/5"', "the name of case 'row/5' holds '/'"),
     ('name = "pso+least_squares"', 'name = "random"',
-     "identifier 'random' is there twice with the same fitness, noise and seeds"),
+     "identifier 'random': the same run is asked for twice (fitness rmse, window 0-0.3 s), each once is expected"),
     ('name = "pso+least_squares"', 'name = "pso+least_squares"\nlabel = "random"',
      "label 'random' names identifiers of other name or options"),
     ('name = "small"', 'name = "../small"', "key 'name' is '../small', a plain name"),
@@ -99,7 +99,7 @@ def test_a_variant_of_a_campaign_is_no_folder(write_study, tmp_path, paper_arm_f
 def test_a_link_out_of_the_folder(write_study, tmp_path, paper_arm_folder):
     (tmp_path / "c").symlink_to(paper_arm_folder)
     file = write_study(change=("manoeuvres = [{ start", 'campaign = "c" #'))
-    with pytest.raises(ArmidError, match="campaign 'c' links out of the folder of the study"):
+    with pytest.raises(ArmidError, match="campaign 'c' leads out of the folder of the study"):
         read_study(file)
 
 

@@ -59,7 +59,7 @@ def written(tmp_path):
 def test_budgets_for_each_parameter_need_no_other(written):
     study = read_study(written(**{"budget = 100\n": ""}))
     assert {run.budget for run in study.plan()} == {m * len(c.bounds) for c in study.cases for m in (5, 30)}
-    assert study.description()["budget"] == 30
+    assert [entry.budget for entry in study.entries] == [30, 30]
 
 
 def test_the_plan_has_each_problem_with_its_own_fitness_and_budgets_that_are_cut(written):

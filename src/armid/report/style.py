@@ -241,10 +241,8 @@ def thinned(values: Array, most: int = MOST_VECTOR_POINTS) -> NDArray[np.intp]:
     return np.unique(np.array(chosen, dtype=np.intp))
 
 
-# Where names stand right of the axes, as shares of their width; the distance between two [inch], and the height that
-# an upright panel needs outside its axes [inch].
-RIGHT_OF_AXES, SAMPLE, GAP = 1.045, 0.055, 0.012
-APART_INCH, FRAME_INCH, LEAST_HEIGHT = 0.235, 1.0, 4.6
+# Height of an upright panel with a name for each line at its side [inch].
+LEAST_HEIGHT = 4.6
 # Identifiers that have a colour of their own in a report.
 MOST_COLOURED = 6
 
@@ -275,13 +273,16 @@ def named_lines(axis: Any, x: ArrayLike, lines: Mapping[str, ArrayLike], colours
 
     The first have a colour each, all others are grey and share a name.
     """
+    from matplotlib.lines import Line2D
+
     # the axes keep the upright range that they have
     axis.set_ylim(*axis.get_ylim())
     for name in sorted(lines, key=lambda name: colours[name], reverse=True):
         axis.plot(x, lines[name], **line_look(colours[name]))
     axis.margins(x=0.0)
-    for i, (name, number) in enumerate(legend_rows({name: colours[name] for name in lines})):
-        write_name(axis, name, 1.0 - name_distance(axis) * (i + 0.5), number)
+    rows = legend_rows({name: colours[name] for name in lines})
+    axis.legend(handles=[Line2D([], [], label=name, **line_look(number)) for name, number in rows], frameon=False,
+                loc="upper left", bbox_to_anchor=(1.0, 1.0), fontsize=10)  # fmt: skip
 
 
 def legend_rows(colours: Mapping[str, int]) -> list[tuple[str, int]]:
@@ -323,14 +324,3 @@ def draw_intervals(axis: Any, x: Array, y: Array, low: Array, high: Array, k: in
     colours = [line_look(i)["color"] for i in numbers]
     axis.errorbar(x, y, xerr=np.array([x - low, high - x]).clip(min=0.0), fmt="none", ecolor=colours, elinewidth=1.4)
     axis.scatter(x, y, c=colours, marker=marker_of(k), s=26, zorder=3)
-
-
-def write_name(axis: Any, name: str, place: float, number: int) -> None:
-    style = {"transform": axis.transAxes, "clip_on": False}
-    axis.plot([RIGHT_OF_AXES, RIGHT_OF_AXES + SAMPLE], [place, place], **style, **line_look(number))
-    axis.text(RIGHT_OF_AXES + SAMPLE + GAP, place, name, transform=axis.transAxes, color=INK, va="center", fontsize=10)
-
-
-def name_distance(axis: Any) -> float:
-    grid = axis.get_subplotspec().get_gridspec()
-    return float(APART_INCH / (axis.figure.get_size_inches()[1] / grid.nrows - FRAME_INCH))

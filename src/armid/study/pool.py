@@ -35,7 +35,7 @@ MOST_STARTS = 3
 START_S = 300.0
 THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 LATE, DIED = "late", "died"
-NO_MESSAGE = "what came from the worker process is not a message of ours: something in the run writes into its pipe"
+NO_MESSAGE = "sent what is not a message of ours: something in the run writes into its pipe"
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ class Worker:
             if word == LATE:
                 error = f"stopped at the time limit of {self.setup.time_limit:g} s"
                 break
-            error = f"{content if word == DIED else NO_MESSAGE}, {MOST_DEATHS} times"
+            error = f"the worker process {content if word == DIED else NO_MESSAGE}, {MOST_DEATHS} times"
         return Outcome(run.run, FAILED, error, seconds=time.monotonic() - began)
 
     def stop(self) -> None:
@@ -106,10 +106,8 @@ class Worker:
             self._end()
             if word == REFUSED:
                 raise ArmidError(content)
-        cause = (
-            f"it was not ready within {START_S:g} s" if word == LATE else content.replace("the worker process", "it")
-        )
-        raise ArmidError(f"a worker process cannot start: {cause.replace('it ended', 'it ends')}")
+        cause = f"was not ready within {START_S:g} s" if word == LATE else content
+        raise ArmidError(f"a worker process cannot start: it {cause}")
 
     def _answer(self, message: Any, seconds: float) -> tuple[str, Any]:
         """Return word and content of the worker's answer to a message; after so many seconds it is killed."""
@@ -130,7 +128,8 @@ class Worker:
             return word, content
         except (EOFError, OSError):
             code = process.wait()
-            return (LATE, "") if late.is_set() else (DIED, f"the worker process ended {_cause(code)}")
+            by = f"with code {code}" if code >= 0 else f"by {signal.Signals(-code).name}"
+            return (LATE, "") if late.is_set() else (DIED, f"ended {by}")
         except Exception:
             # the bytes are not a pickle, or the object is not a word and its content
             return DIED, NO_MESSAGE
@@ -193,15 +192,6 @@ def sigint_blocked() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-def _cause(code: int) -> str:
-    if code >= 0:
-        return f"with code {code}"
-    try:
-        return f"by {signal.Signals(-code).name}"
-    except ValueError:
-        return f"by signal {-code}"
 
 
 # Time in which a cluster has to answer [s].

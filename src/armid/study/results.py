@@ -47,6 +47,7 @@ FROM plan p JOIN runs r USING (run) JOIN loops l USING (run) ORDER BY p.place
 TRACES = "SELECT t.run, t.names, t.trace FROM plan p JOIN traces t USING (run)"
 NUMERIC_COLUMNS = ("noise_deg_s", "value", "train_rmse", "train_s", "train_s1", "train_s2", "holdout_rmse", "seconds")
 COUNTED = ("used", "n_failed")
+EMPTY = RunTrace("", np.empty(0, np.int64), np.empty(0), np.empty((0, 0)), ())
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -100,8 +101,7 @@ class StudyResults(Shown):
     @property
     def traces(self) -> pd.DataFrame:
         """One row an improvement: run, evaluation, value, and x_NAME for each parameter of the study."""
-        frames = [self._frame(trace) for trace in self.iter_traces()]
-        return pd.concat(frames, ignore_index=True) if frames else self._frame(None)
+        return pd.concat([*map(self._frame, self.iter_traces())] or [self._frame(EMPTY)], ignore_index=True)
 
     def trace_of(self, run: str) -> pd.DataFrame:
         """Return the improvements of one run; ArmidError for one that is not there or has failed."""
@@ -143,10 +143,8 @@ class StudyResults(Shown):
             for run, names, content in connection.execute(query, values):
                 yield unpacked(run, content, tuple(json.loads(names)))
 
-    def _frame(self, trace: RunTrace | None) -> pd.DataFrame:
-        """Return a trace as a table with a column for every parameter of the study, None: one without rows."""
-        if trace is None:
-            trace = RunTrace("", np.empty(0, np.int64), np.empty(0), np.empty((0, 0)), ())
+    def _frame(self, trace: RunTrace) -> pd.DataFrame:
+        """Return a trace as a table with a column for every parameter of the study."""
         frame = pd.DataFrame({"run": trace.run, "evaluation": trace.evaluations, "value": trace.values})
         candidates = pd.DataFrame(trace.X, columns=list(trace.names)).reindex(columns=self.study["parameters"])
         return frame.join(candidates.add_prefix("x_"))

@@ -218,28 +218,25 @@ def progress_bar(is_shown: bool) -> Iterator[Progress]:
     if drawn_on is None:
         yield lambda counts, outcome: None
         return
-    from rich.progress import BarColumn
+    from rich.progress import BarColumn, TimeRemainingColumn
     from rich.progress import Progress as Bar
 
-    columns = "{task.completed:.0f}/{task.total:.0f} runs", BarColumn(), "{task.fields[rate]}", "{task.fields[left]}"
+    columns = "{task.completed:.0f}/{task.total:.0f} runs", BarColumn(), "{task.fields[rate]}", TimeRemainingColumn()
     with Bar(*columns, console=drawn_on, refresh_per_second=4) as bar:
-        task = bar.add_task("", total=1, visible=False, rate="", left="")
-        began, finished, simulations = time.monotonic(), 0, 0
+        task = bar.add_task("", total=1, visible=False, rate="")
+        began = simulations = 0.0
 
         def update(counts: Counts, outcome: Outcome | None) -> None:
-            nonlocal began, finished, simulations
+            nonlocal began, simulations
             if outcome is None:
-                began, finished, simulations = time.monotonic(), 0, 0
-            else:
-                finished, simulations = finished + 1, simulations + outcome.used
-            seconds, missing = max(time.monotonic() - began, 1e-9), counts.missing - finished
-            left = f"{span(seconds / finished * missing)} left" if finished else "starting"
-            rate = f"{simulations / seconds:,.0f} simulations/s"
-            if finished and not simulations:
-                # closed loops count none
-                rate = f"{60.0 * finished / seconds:.3g} runs/min"
-            done = counts.planned - missing
-            bar.update(task, total=counts.planned, completed=done, visible=True, rate=rate, left=left)
+                began, simulations = time.monotonic(), 0.0
+                ended = counts.planned - counts.missing
+                bar.update(task, total=counts.planned, completed=ended, visible=True, rate="starting")
+                return
+            simulations += outcome.used
+            speed = simulations / max(time.monotonic() - began, 1e-9)
+            # closed loops count no simulations
+            bar.update(task, advance=1, rate=f"{speed:,.0f} simulations/s" if speed else "")
 
         yield update
 

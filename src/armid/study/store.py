@@ -208,31 +208,23 @@ class Store:
     def plan(self, description: Mapping[str, Any], planned: Iterable[Planned]) -> None:
         """Set what the study consists of now; finished runs stay, also those that it no longer asks for."""
         with translate_errors(self.path), transaction(self._connection):
-            name, before = str(description["name"]), self._kept("description")
-            other = json.loads(before)["name"] if before else name
+            name = str(description["name"])
+            before = self._connection.execute("SELECT value FROM study WHERE key = 'description'").fetchone()
+            other = json.loads(before[0])["name"] if before else name
             if other != name:
                 raise ArmidError(f"{self.path} holds the study '{other}', another folder is expected for '{name}'")
-            # an earlier version kept runs that were cut off
-            cut = "SELECT run FROM identified WHERE stopped = 'interrupted'"
-            self._connection.execute(f"DELETE FROM runs WHERE run IN ({cut})")
             self._connection.execute("DELETE FROM plan")
             self._connection.executemany("INSERT INTO plan VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)", self._rows(planned))
             kept = "SELECT run FROM plan UNION SELECT run FROM runs"
             self._connection.execute(f"DELETE FROM settings WHERE run NOT IN ({kept})")
-            self._keep("description", json.dumps(description, ensure_ascii=False))
+            row = "description", json.dumps(description, ensure_ascii=False)
+            self._connection.execute("INSERT OR REPLACE INTO study VALUES (?, ?)", row)
 
     def _rows(self, planned: Iterable[Planned]) -> Iterable[tuple[Any, ...]]:
         """Yield rows of the plan one by one, so that a large study needs no memory, and keep their settings."""
         for place, each in enumerate(planned):
             self._connection.execute("INSERT OR IGNORE INTO settings VALUES (?, ?)", (each.run, each.settings))
             yield (place, each.run, *each[2:])
-
-    def _kept(self, key: str) -> str:
-        row = self._connection.execute("SELECT value FROM study WHERE key = ?", (key,)).fetchone()
-        return str(row[0]) if row else ""
-
-    def _keep(self, key: str, value: str) -> None:
-        self._connection.execute("INSERT OR REPLACE INTO study VALUES (?, ?)", (key, value))
 
     def forget_failed(self) -> None:
         """Take out the failed runs that this runner looks at, so that they are performed anew."""

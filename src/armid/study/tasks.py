@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, fields
 from datetime import UTC, datetime
 from functools import cache, cached_property
-from itertools import product
+from itertools import combinations, product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
@@ -35,7 +35,7 @@ from armid.progress import announced
 from armid.record import Campaign
 from armid.record.schema import load_toml, unknown_name, validated
 from armid.registry import place_in_plugin
-from armid.study.cases import Case, RunCache, cases_of, clean_records
+from armid.study.cases import Case, RunCache, cases_of, clean_records, in_window
 from armid.study.spec import (
     BUDGETS,
     CLOSES_LOOP,
@@ -244,7 +244,8 @@ class Study:
                 if outcome.status == FAILED:
                     raise ArmidError(f"identifier '{entry.label}': it cannot be built: {outcome.error}")
         asked: set[str] = set()
-        for run in self.plan({entry.seeds[0] for entry in self.entries}):
+        shared = [{*one.seeds} & {*two.seeds} for one, two in combinations(self.entries, 2)]
+        for run in self.plan({entry.seeds[0] for entry in self.entries} | {min(both) for both in shared if both}):
             if run.run in asked:
                 raise ArmidError(f"case '{run.case}', identifier '{run.identifier}': the same run is asked for twice "
                                  f"(fitness {run.fitness}, window {run.window}), each once is expected")  # fmt: skip
@@ -252,7 +253,10 @@ class Study:
         for case in self.cases:
             if case.source is None and case.suite is None:
                 try:
-                    clean_records(self._case_settings(case), case.model)
+                    for record, window in product(
+                        clean_records(self._case_settings(case), case.model), self.spec.windows_s
+                    ):
+                        in_window(record, window)
                 except ArmidError as error:
                     raise ArmidError(f"case '{case.name}', {error}") from error
 
@@ -269,7 +273,7 @@ class Study:
 
     def description(self, _: Path = Path()) -> dict[str, Any]:
         """Return what a report needs to know, as JSON can hold it, wherever the store is."""
-        spec, entries, angles = self.spec, self.entries, {case.angle for case in self.cases}
+        spec, angles = self.spec, {case.angle for case in self.cases}
         return {
             "name": self.name,
             "question": spec.question,
@@ -280,15 +284,10 @@ class Study:
             "unit": self.cases[0].model.plant.output_unit,
             "angle": angles.pop() if len(angles) == 1 else DEG,
             "effects": list(spec.effects),
-            "budget": max(entry.budget for entry in entries),
-            "fitness": list(dict.fromkeys(f for e in entries for f in e.fitness)),
-            "identifiers": list(dict.fromkeys(entry.label for entry in entries)),
-            "noise_deg_s": list(dict.fromkeys(n for e in entries for n in e.noise_deg_s)),
-            "seeds": list(dict.fromkeys(s for e in entries for s in e.seeds)),
-            "windows": [window_text(w) for w in spec.windows_s],
+            "identifiers": list(dict.fromkeys(self.labels)),
             "plugins": list(self.registry.plugins),
             "cases": [_case_description(case) for case in self.cases],
-            "budget_per_parameter": sorted({m for e in entries for m in e.per_parameter}),
+            "budget_per_parameter": sorted({m for e in self.entries for m in e.per_parameter}),
             "published": {case.name: dict(case.published) for case in self.cases if case.published},
         }
 
@@ -389,9 +388,10 @@ def _entries(spec: StudySpec, unit: str, registry: StudyRegistry, where: str) ->
             raise ArmidError(f"{where}: key 'budget' is missing, {BUDGETS['expected']} is expected")
         _check_built(entry, registry, at)
         entries.append(entry)
-    for i, entry in enumerate(entries):
-        for other in entries[:i]:
-            _check_apart(entry, other, where)
+    for one, two in combinations(entries, 2):
+        if one.label == two.label and (one.name, one.options) != (two.name, two.options):
+            raise ArmidError(f"{where}: label '{one.label}' names identifiers of other name or options, "
+                             "a label of its own is expected for each")  # fmt: skip
     return tuple(entries)
 
 
@@ -433,20 +433,6 @@ def _check_built(entry: Entry, registry: StudyRegistry, where: str) -> None:
             built.build(entry.budget)
     except ArmidError as error:
         raise ArmidError(f"{where}: {error}") from error
-
-
-def _check_apart(entry: Entry, other: Entry, where: str) -> None:
-    """Refuse a label of two things, and a run that two entries ask for."""
-    same_label = other.label == entry.label
-    same_thing = (other.name, other.options) == (entry.name, entry.options)
-    if same_label and not same_thing:
-        raise ArmidError(f"{where}: label '{entry.label}' names identifiers of other name or options, "
-                         "a label of its own is expected for each")  # fmt: skip
-    shared = (entry.fitness, other.fitness), (entry.noise_deg_s, other.noise_deg_s), (entry.seeds, other.seeds)
-    same_run = all(set(one) & set(two) for one, two in shared)
-    if same_run and (same_label or (same_thing and set(other.several) & set(entry.several))):
-        raise ArmidError(f"{where}: identifier '{entry.label}' is there twice with the same fitness, noise and "
-                         "seeds, each run once is expected")  # fmt: skip
 
 
 def _check_noise(entry: Entry, cases: Sequence[Case], registry: StudyRegistry, where: str) -> None:

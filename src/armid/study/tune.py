@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from armid.errors import ArmidError
-from armid.identifiers import IDENTIFIERS, Identifier
+from armid.identifiers import IDENTIFIERS
 from armid.identifiers.identifier import options_in
 from armid.report.document import Column, Document, listed, table
 from armid.study.analyses.analysis import TARGETS, first_hits, remaining_share
@@ -27,14 +27,10 @@ from armid.study.runner import Ending, Progress, run
 from armid.study.store import DONE
 from armid.study.tasks import Entry, Study
 
-
-def ranges_of(identifier: Identifier) -> dict[str, tuple[float, float]]:
-    options = ((option.name, option.metadata["option"].tune) for option in options_in(identifier.algorithm))
-    return {name: tune for name, tune in options if tune is not None}
-
-
 # Identifier -> option -> range: whole numbers where both ends are; in the logarithm where they are 10 times apart.
-RANGES = {name: ranges for name, identifier in IDENTIFIERS.items() if (ranges := ranges_of(identifier))}
+RANGES = {name: ranges for name, identifier in IDENTIFIERS.items() if (ranges := {
+    option.name: tune for option in options_in(identifier.algorithm) if (tune := option.metadata["option"].tune)
+})}  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 from pandas import DataFrame, Series
 
 from armid.model import Array
@@ -213,17 +212,15 @@ def signed_ranks(differences: Array, axis: int) -> Array:
     return np.asarray(np.sum(np.sign(differences) * rankdata(np.abs(differences), axis=axis), axis=axis))
 
 
-def a12(first: ArrayLike, second: ArrayLike) -> float:
+def a12(first: Sequence[float] | Array, second: Sequence[float] | Array) -> float:
     """Return the probability that a number of the first sample is smaller than one of the second, ties by half.
 
-    Infinite ones are allowed; NaN for an empty sample. Source: Vargha and Delaney, J. Educ. Behav. Stat. 25 (2000) 101.
+    Infinite ones are allowed. Source: Vargha and Delaney, J. Educ. Behav. Stat. 25 (2000) 101.
     """
-    x, y = np.asarray(first, np.float64), np.sort(np.asarray(second, np.float64))
-    if not x.size or not y.size:
-        return np.nan
-    above = y.size - np.searchsorted(y, x, side="right")
-    not_below = y.size - np.searchsorted(y, x, side="left")
-    return float((above + not_below).sum() / (2.0 * x.size * y.size))
+    from scipy.stats import rankdata
+
+    n, ranks = len(first), rankdata([*second, *first])
+    return float((ranks[:-n].sum() / (len(ranks) - n) - 0.5 * (len(ranks) - n + 1)) / n)
 
 
 def size_in_words(value: float) -> str:
@@ -264,12 +261,10 @@ def pairs(tests: RankTests, setting: str, name: str) -> Table:
 
 
 def p_matrix(tests: RankTests) -> DataFrame:
-    names = list(tests.blocks.columns)
-    place = {name: i for i, name in enumerate(names)}
-    matrix = np.ones((len(names), len(names)))
-    first, second = (tests.pairs[key].map(place).to_numpy(int) for key in ("first", "second"))
-    matrix[first, second] = matrix[second, first] = tests.pairs["p_holm"].to_numpy(float)
-    return DataFrame(matrix, index=names, columns=names)
+    """Return the corrected p of each pair, 1 of a variant with itself."""
+    names = tests.blocks.columns
+    above = tests.pairs.pivot(index="first", columns="second", values="p_holm").reindex(index=names, columns=names)
+    return above.combine_first(above.T).fillna(1.0)
 
 
 def critical_difference_figure(tests: RankTests, colours: Mapping[str, int]) -> Any:
