@@ -1,6 +1,7 @@
 """Which campaigns the study consists of, in an order in which a study that is cut short has seen all families alike."""
 
 import json
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,6 +46,11 @@ class Task:
 def file_of(folder: Path, task: Task) -> Path:
     """Return where what a closed campaign says is kept."""
     return folder / "closed" / f"{task.name}.json"
+
+
+def former_file(folder: Path, task: Task) -> Path:
+    """Return where what an earlier version says of the same campaign is kept."""
+    return folder / "former" / f"{task.name}.json"
 
 
 def truth_file(folder: Path, task: Task) -> Path:
@@ -100,3 +106,9 @@ def plain(value: Any) -> Any:
     if isinstance(value, (set, frozenset)):
         return sorted(value)
     return str(value)
+
+
+def seconds() -> float:
+    """Return the processor time of this process [s]."""
+    times = os.times()
+    return times.user + times.system

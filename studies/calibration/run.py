@@ -7,7 +7,6 @@ FOLDER/closed/NAME.json holds what a report says, and the models of the mixture 
 
 import argparse
 import json
-import os
 import sys
 import traceback
 import warnings
@@ -24,7 +23,7 @@ from armid.model import EFFECTS
 from armid.model.effects.sensor import sensor_effects
 from armid.record import read_campaign
 from armid.registry import load_registry
-from calibration.campaigns import HIDDEN, MACHINE, PLANTS, Task, campaign_of, file_of, tasks, written
+from calibration.campaigns import HIDDEN, MACHINE, PLANTS, Task, campaign_of, file_of, seconds, tasks, written
 
 KEPT = ("version", "verdict", "also", "effects", "steps", "suspects", "withdrawn", "error", "parameters",
         "probabilities")  # fmt: skip
@@ -101,11 +100,6 @@ def kept_of(found: ClosedLoop) -> dict[str, Any]:
     ]  # fmt: skip
     kept = {key: report[key] for key in KEPT} | {"parameter_names": mixture.parameters, "mixture": atoms}
     return kept | {"leaves_more": found.after.diagnosis.significant}
-
-
-def seconds() -> float:
-    times = os.times()
-    return times.user + times.system
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import matplotlib as mpl
 import pandas as pd
 
-from calibration.campaigns import HIDDEN, MACHINE, Task, file_of, tasks, truth_file
+from calibration.campaigns import HIDDEN, MACHINE, Task, file_of, former_file, tasks, truth_file
 from calibration.scores import Closed, Score, reliability, scores_of
 from calibration.truth import truth_of
 
@@ -48,8 +49,15 @@ def read(folder: Path) -> tuple[dict[str, Any], list[Closed], list[str]]:
             if "failed" in answer:
                 failed.append(task.name)
             else:
-                every.append(closed_of(task, json.loads(truth_file(folder, task).read_text()), answer))
+                one = closed_of(task, json.loads(truth_file(folder, task).read_text()), answer)
+                every.append(replace(one, former=former_of(folder, task)))
     return plan, every, failed
+
+
+def former_of(folder: Path, task: Task) -> dict[str, Any] | None:
+    path = former_file(folder, task)
+    answer = json.loads(path.read_text()) if path.exists() else {"failed": ""}
+    return None if "failed" in answer else answer
 
 
 def closed_of(task: Task, entry: dict[str, Any], answer: dict[str, Any]) -> Closed:

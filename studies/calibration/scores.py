@@ -24,7 +24,10 @@ N_BOOTSTRAP, LEVEL = 1000, 0.05
 
 @dataclass(frozen=True, eq=False)
 class Closed:
-    """Hold one closed campaign: its family, its group (arm, machines, left out), its truth, the answer."""
+    """Hold one closed campaign: its family, its group (arm, machines, left out), its truth, the answer.
+
+    former: the answer of an earlier version to the same campaign, None where it was not asked or ended in an error.
+    """
 
     name: str
     family: str
@@ -33,6 +36,7 @@ class Closed:
     truth: Truth
     entry: dict[str, Any]
     answer: dict[str, Any]
+    former: dict[str, Any] | None = None
 
     @property
     def chances(self) -> dict[str, float]:
@@ -73,11 +77,24 @@ class Closed:
 
     def held(self) -> list[tuple[float, float, float]]:
         """Return value, low and high of each parameter, in units of the true value."""
+        return self.held_in(self.answer)
+
+    def held_in(self, answer: dict[str, Any]) -> list[tuple[float, float, float]]:
         found = []
         for name, true in self.truth.parameters.items():
-            one = self.answer["parameters"]["after"][name]
+            one = answer["parameters"]["after"][name]
             found.append((one["value"] / true, *sorted((one["low"] / true, one["high"] / true))))
         return found
+
+    def beside_former(self) -> list[tuple[float, float]]:
+        """Return the interval score of each parameter, and that of the earlier version."""
+        if self.former is None:
+            return []
+        pairs = zip(self.held(), self.held_in(self.former), strict=True)
+        return [(interval_score([mine]), interval_score([its])) for mine, its in pairs]
+
+    def times_beside_former(self) -> list[tuple[float, float]]:
+        return [] if self.former is None else [(self.answer["cpu_s"], self.former["cpu_s"])]
 
 
 @dataclass(frozen=True)
@@ -143,6 +160,19 @@ def interval_score(held: Sequence[tuple[float, float, float]]) -> float:
     """Return the mean width plus penalty of 95 % intervals, in units of the value (Gneiting, Raftery 2007)."""
     return float(np.mean([high - low + 2.0 / LEVEL * (max(low - 1.0, 0.0) + max(1.0 - high, 0.0))
                           for _, low, high in held]))  # fmt: skip
+
+
+def ratio_of(total: Callable[[Sequence[float]], float]) -> Callable[[Sequence[tuple[float, float]]], float]:
+    """Return the total of the first of all pairs over that of the second."""
+    return lambda pairs: total([mine for mine, _ in pairs]) / total([its for _, its in pairs])
+
+
+def median(values: Sequence[float]) -> float:
+    return float(np.median(values))
+
+
+def median_ratio(pairs: Sequence[tuple[float, float]]) -> float:
+    return median([mine / its for mine, its in pairs])
 
 
 def inside(one: Closed) -> list[bool]:
@@ -265,7 +295,13 @@ def of_group(group: str, mine: Sequence[Closed]) -> list[Score]:
     line("S6", "held out worse than the declared model", is_worse, "<= 0")
     line("held out", "error over noise up to 1.1", lambda c: [r <= 1.1 for r in ratio(c)], ">= 0.85")
     line("held out", "error over noise up to 1.5", lambda c: [r <= 1.5 for r in ratio(c)], ">= 0.97")
-    line("time", "processor time of a campaign, median [s]", lambda c: [c.answer["cpu_s"]], "",
-         total=lambda values: float(np.median(values)))  # fmt: skip
+    line("S4", "interval score over that of the former loop", Closed.beside_former, "<= 0.7", total=ratio_of(sum))
+    line(
+        "S4", "the same, the median of parameters", Closed.beside_former, total=lambda v: median([m / i for m, i in v])
+    )
+    line("time", "processor time of a campaign, median [s]", lambda c: [c.answer["cpu_s"]], "", total=median)
     line("time", "processor time of a campaign, longest [s]", lambda c: [c.answer["cpu_s"]], "", total=max)
+    times = Closed.times_beside_former
+    line("time", "median over that of the former loop", times, "<= 1.5", total=ratio_of(median))
+    line("time", "longest over that of the former loop", times, "<= 0.5", total=ratio_of(max))
     return [one for one in found if one.n]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from calibration.campaigns import ARM, HIDDEN, MACHINE, tasks
-from calibration.scores import Score, calibration_error, interval_score, reliability, score
+from calibration.scores import Closed, Score, calibration_error, interval_score, median, ratio_of, reliability, score
 from calibration.truth import all_found, truth_of
 
 ENTRY = {
@@ -51,6 +51,18 @@ def test_probabilities_that_come_true_have_no_error_and_sure_ones_that_do_not_ha
 def test_an_interval_that_misses_costs_forty_times_by_how_much():
     assert interval_score([(1.0, 0.99, 1.01)]) == pytest.approx(0.02)
     assert interval_score([(1.1, 1.05, 1.15)]) == pytest.approx(0.1 + 40.0 * 0.05)
+
+
+def test_both_versions_are_compared_on_the_campaigns_that_both_closed():
+    def answer(low, high, cpu_s):
+        return {"parameters": {"after": {"mass": {"value": 2.0, "low": low, "high": high}}}, "cpu_s": cpu_s}
+
+    mine, its = answer(1.9, 2.1, 10.0), answer(2.0, 2.4, 5.0)
+    truth = truth_of(ENTRY, hidden=False)
+    both = Closed("one_000", "one", "arm", "arm", truth, ENTRY, mine, its)
+    assert both.beside_former() == [(pytest.approx(0.1), pytest.approx(0.2))]
+    assert ratio_of(median)(both.times_beside_former()) == 2.0
+    assert Closed("one_001", "one", "arm", "arm", truth, ENTRY, mine).beside_former() == []
 
 
 def test_a_target_is_met_where_the_interval_touches_it():
