@@ -59,7 +59,7 @@ def written(tmp_path):
 def test_budgets_for_each_parameter_need_no_other(written):
     study = read_study(written(**{"budget = 100\n": ""}))
     assert {run.budget for run in study.plan()} == {m * len(c.bounds) for c in study.cases for m in (5, 30)}
-    assert [entry.budget for entry in study.entries] == [30, 30]
+    assert [entry.largest_budget for entry in study.entries] == [30, 30]
 
 
 def test_the_plan_has_each_problem_with_its_own_fitness_and_budgets_that_are_cut(written):
@@ -245,8 +245,8 @@ def test_a_tuned_identifier_has_the_budgets_and_seeds_of_the_one_as_it_is(writte
     assert tuned.name == "own_tuned"
     assert tuned.labels == ["pso", "cmaes", "pso, tuned", "cmaes, tuned"]
     for before, after in zip(tuned.entries[:2], tuned.entries[2:]):
-        assert (after.name, after.budget, after.per_parameter, after.seeds) == (
-            before.name, before.budget, before.per_parameter, before.seeds
+        assert (after.name, after.budget, after.budget_per_parameter, after.seeds) == (
+            before.name, before.budget, before.budget_per_parameter, before.seeds
         )  # fmt: skip
     assert [dict(entry.options) for entry in tuned.entries[2:]] == [{"c1": 1.5}, {"growth": 2.0}]
     file.write_text(tuned_study(tuned, [Tuned("pso", {"c1": 1.7}, 0.2, 0.3)]))

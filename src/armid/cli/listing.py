@@ -1,8 +1,7 @@
 """`armid list`: what there is to choose from."""
 
 import textwrap
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Callable, Iterable, Sequence
 from inspect import signature
 from shutil import get_terminal_size
 from typing import Any
@@ -58,8 +57,9 @@ def list_command(what: str, names: tuple[str, ...], is_long: bool, plugins: tupl
     elif wants("json"):
         give(**{what: {name: entry(thing) for name, thing in things.items()}})
     elif names or is_long:
-        text = partial(DETAILS_OF[what], registry=registry, is_long=is_long)
-        say(*"\n\n".join(text(name, thing) for name, thing in things.items()).splitlines())
+        for i, (name, thing) in enumerate(things.items()):
+            lines = DETAILS_OF[what](name, thing, registry, is_long)
+            say(*[""] * (i > 0), *(part for line in lines for part in folded(line) or [""]))
     else:
         columns, row = SHORT_TABLES[what]
         hint = f"; `armid list {what} NAME` says more"
@@ -100,9 +100,8 @@ def recorded_by(plant: Plant) -> str:
     return ", ".join(dict.fromkeys(o.unit for p in (plant, *plant.variants) for o in p.outputs))
 
 
-def plain_text(name: str, thing: Any, registry: Registry, is_long: bool) -> str:
-    joined = f" (records join by {thing.join})" if hasattr(thing, "join") else ""
-    return folded(f"{name}: {note_of(thing)}{joined}")
+def plain_lines(name: str, thing: Any, registry: Registry, is_long: bool) -> list[str]:
+    return [f"{name}: {note_of(thing)}{f' (records join by {thing.join})' if hasattr(thing, 'join') else ''}"]
 
 
 def entry(thing: Any) -> dict[str, Any]:
@@ -120,28 +119,24 @@ def entry(thing: Any) -> dict[str, Any]:
     return fields | ({"unit": thing.unit, "join": thing.join} if hasattr(thing, "join") else {})
 
 
-def identifier_text(name: str, identifier: Any, registry: Registry, is_long: bool) -> str:
+def identifier_lines(name: str, identifier: Any, registry: Registry, is_long: bool) -> list[str]:
     from armid.identifiers import options_of
 
-    lines = [folded(f"{name}: {note_of(identifier)} ({kinds_of(identifier)})")]
+    lines = [f"{name}: {note_of(identifier)} ({kinds_of(identifier)})"]
     for option, declared in options_of(identifier).items():
         default = declared["default"]
         value = "its own" if default is None or callable(default) else quoted(default).strip("'")
         unit = f" [{declared['unit']}]" if declared["unit"] else ""
-        lines.append(folded(f"  --option {option}={value}{unit} {declared['meaning']}"))
-    return "\n".join(lines)
+        lines.append(f"  --option {option}={value}{unit} {declared['meaning']}")
+    return lines
 
 
-def effect_text(name: str, effect: Effect, registry: Registry, is_long: bool) -> str:
-    plants = [p for plant in registry.plants.values() for p in (plant, *plant.variants)]
-    has_forms = len(effect.every_form) > 1
+def effect_lines(name: str, effect: Effect, registry: Registry, is_long: bool) -> list[str]:
     lines = [f"{name}: {note_of(effect)}"]
     for form in effect.every_form:
-        lines += [f"  in the form {form.form}"] if has_forms else []
-        lines += form_lines(form, is_long)
-        lines += [f"  source: {form.source}"] if form.source and (has_forms or form.source != effect.source) else []
-    lines += [f"  source: {effect.source}"] if effect.source and not has_forms else []
-    return "\n".join(folded(line) for line in [*lines, f"  on {places(effect, plants)}"])
+        lines += [f"  in the form {form.form}"] if len(effect.every_form) > 1 else []
+        lines += [*form_lines(form, is_long), *([f"  source: {form.source}"] if form.source else [])]
+    return [*lines, f"  on {places(effect, registry.plants.values())}"]
 
 
 def form_lines(effect: Effect, is_long: bool) -> list[str]:
@@ -158,21 +153,20 @@ def form_lines(effect: Effect, is_long: bool) -> list[str]:
     return [*lines, *(f"  {parameter_text(p)}" for p in effect.parameters)]
 
 
-def places(effect: Effect, plants: Sequence[Plant]) -> str:
+def places(effect: Effect, plants: Iterable[Plant]) -> str:
     """Return the plants that offer the ports and names of an effect, siblings by what they record."""
-    fitting = [p for p in plants if any(not refusal_of(e, p) for e in effect.every_form)]
-    names = list(dict.fromkeys(p.name for p in fitting))
     texts = []
-    for name in names:
-        units = [p.output_unit for p in fitting if p.name == name]
-        whole = len(units) == sum(p.name == name for p in plants)
-        texts.append(name if whole else f"{name} in {', '.join(units)}")
+    for plant in plants:
+        siblings = (plant, *plant.variants)
+        units = [p.output_unit for p in siblings if any(not refusal_of(e, p) for e in effect.every_form)]
+        if units:
+            texts.append(plant.name if len(units) == len(siblings) else f"{plant.name} in {', '.join(units)}")
     return ", ".join(texts) or "no plant"
 
 
-def folded(line: str) -> str:
+def folded(line: str) -> list[str]:
     width = min(get_terminal_size().columns, WIDTH)
-    return textwrap.fill(line, width, subsequent_indent="      ", break_long_words=False, break_on_hyphens=False)
+    return textwrap.wrap(line, width, subsequent_indent="      ", break_long_words=False, break_on_hyphens=False)
 
 
 def parameter_text(parameter: Parameter) -> str:
@@ -184,11 +178,14 @@ def parameter_text(parameter: Parameter) -> str:
     return f"{text}: {parameter.note}" if parameter.note else text
 
 
-def plant_text(name: str, plant: Plant, registry: Registry, is_long: bool) -> str:
-    return "\n\n".join(sibling_text(p, is_long) for p in (plant, *plant.variants))
+def plant_lines(name: str, plant: Plant, registry: Registry, is_long: bool) -> list[str]:
+    lines = sibling_lines(plant, is_long)
+    for variant in plant.variants:
+        lines += ["", *sibling_lines(variant, is_long)]
+    return lines
 
 
-def sibling_text(plant: Plant, is_long: bool) -> str:
+def sibling_lines(plant: Plant, is_long: bool) -> list[str]:
     lines = [f"{plant.name} (recorded in {', '.join(o.unit for o in plant.outputs)}): {plant.note}"]
     if not plant.records_one_speed:
         lines += [f"  output {o.name} [{o.unit}] = {o.signal} from {' or '.join(o.factors)}" for o in plant.outputs]
@@ -202,8 +199,7 @@ def sibling_text(plant: Plant, is_long: bool) -> str:
     ]
     lines += [f"  constant {c.name} = {c.value:g} {c.unit}{f' ({c.note})' if c.note else ''}" for c in plant.constants]
     lines += [f"  key {k.key} sets {k.constant}" for k in plant.keys]
-    lines += [f"  {alias} is another name for {name}" for alias, name in plant.aliases.items()]
-    return "\n".join(map(folded, lines))
+    return [*lines, *(f"  {alias} is another name for {name}" for alias, name in plant.aliases.items())]
 
 
 # Columns of the table of each catalogue, and the cells of one name after the name itself.
@@ -214,7 +210,7 @@ SHORT_TABLES: dict[str, tuple[tuple[str, ...], Callable[[Any], Sequence[str]]]] 
     "analyses": (("analysis", "what it is"), lambda a: (note_of(a),)),
     "identifiers": (("identifier", "what it is", "kind"), lambda i: (note_of(i), kinds_of(i))),
 }
-DETAILS_OF: dict[str, Callable[..., str]] = {
-    "plants": plant_text, "effects": effect_text, "fitness": plain_text, "analyses": plain_text,
-    "identifiers": identifier_text,
+DETAILS_OF: dict[str, Callable[..., list[str]]] = {
+    "plants": plant_lines, "effects": effect_lines, "fitness": plain_lines, "analyses": plain_lines,
+    "identifiers": identifier_lines,
 }  # fmt: skip

@@ -1,6 +1,5 @@
 """Commands `armid new`, a commented starting file or a campaign guessed from CSV files, and `armid schema`."""
 
-import ast
 import json
 import os.path
 import re
@@ -10,8 +9,11 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from importlib.util import find_spec
+from io import StringIO
 from pathlib import Path
 from string import Template
+from token import NAME
+from tokenize import generate_tokens
 
 import click
 import numpy as np
@@ -21,7 +23,6 @@ from armid.errors import ArmidError, nearest, quoted
 from armid.model import Array
 from armid.model.effect import RESERVED_WORDS
 from armid.model.parameter import check_name
-from armid.record.sensor import FEWEST_REST_SAMPLES, sensor_of, stands_still
 from armid.record.signal import wraps_at
 from armid.record.table import CsvTable, read_table
 from armid.registry import load_registry
@@ -98,8 +99,6 @@ def new_command(kind: str, name: str, style: str, files: tuple[Path, ...], out: 
     if os.path.lexists(target):
         raise ArmidError(f"{target} exists already: another name, or another folder by --out, is expected")
     if kind == CAMPAIGN:
-        from armid.cli.new import guessed_campaign
-
         records = [*files, *more]
         text, tables = guessed_campaign(name, records) if records else (campaign_text(name), synthetic_records())
         write_campaign(target, text, tables)
@@ -165,15 +164,7 @@ def check_new_name(kind: str, name: str, taken: Collection[str], template: str) 
 
 
 def names_in(text: str) -> set[str]:
-    names = set()
-    for node in ast.walk(ast.parse(text)):
-        if isinstance(node, ast.Name):
-            names.add(node.id)
-        elif isinstance(node, ast.FunctionDef | ast.alias):
-            names.add(getattr(node, "asname", None) or node.name)
-        elif isinstance(node, ast.arg):
-            names.add(node.arg)
-    return names
+    return {token.string for token in generate_tokens(StringIO(text).readline) if token.type == NAME}
 
 
 def campaign_text(name: str) -> str:
@@ -189,14 +180,14 @@ def record(size: float, frequency: float, seed: int) -> dict[str, Array]:
 
     J dv/dt = u - c v with u constant between samples is solved exactly: v' = v exp(-c dt/J) + u/c (1 - exp(-c dt/J)).
     """
+    from scipy.signal import lfilter
+
     times = RECORD_INTERVAL * np.arange(RECORD_SAMPLES)
     drive = np.where(
         times < DRIVEN_FROM_S, 0.0, size * np.sign(np.cos(2.0 * np.pi * frequency * (times - DRIVEN_FROM_S)))
     )
     kept = np.exp(-FRICTION_OF_SHAFT * RECORD_INTERVAL / INERTIA)
-    speed = np.zeros(RECORD_SAMPLES)
-    for i in range(RECORD_SAMPLES - 1):
-        speed[i + 1] = kept * speed[i] + drive[i] / FRICTION_OF_SHAFT * (1.0 - kept)
+    speed = lfilter([0.0, (1.0 - kept) / FRICTION_OF_SHAFT], [1.0, -kept], drive)
     measured = speed + NOISE_OF_RECORDS * np.random.default_rng(seed).standard_normal(RECORD_SAMPLES)
     columns = {"time_s": times, "angular_velocity_rad_s": measured, "drive_N_m": drive}
     return {header: np.round(values, DIGITS) for header, values in columns.items()}
@@ -228,8 +219,6 @@ DRIVEN_IN = {"mV": ("V", 1e-3), "kV": ("V", 1e3), "mA": ("A", 1e-3), "kN": ("N",
 LINEAR, DRIVES = {*SUFFIXES["m"], *SUFFIXES["m/s"], "N"}, {"V", "A", "N", "N_m"}
 COUNT_ENDS = ("counts", "counts_s")
 TURNING_ENDS = {*SUFFIXES["rad/s"], *SUFFIXES["rad"]}
-# A machine is at rest as long as its signal is nearer to its first rows than so many times their range.
-BEYOND_REST = 2.5
 # Share of equal neighbours from which on an input keeps its value between samples.
 KEPT = 0.5
 
@@ -436,23 +425,8 @@ def guessed_text(
         lines += [f"unwrap = true  # {wrapped[0]} jumps by whole turns"]
     for i, (file, columns) in enumerate(written.items()):
         last = i == len(written) - 1 and len(written) > 1
-        lines += ["", "[[records]]", f'file = "{file}"  # {about(columns, renamed)}']
+        times = columns["time_s"]
+        rate = f"{times.size} rows at {1.0 / np.median(np.diff(times)):.4g} Hz"
+        lines += ["", "[[records]]", f'file = "{file}"  # {rate}']
         lines += [f'role = "{"holdout" if last else "train"}"' + ("  # GUESS: the last file judges" if last else "")]
     return "\n".join(lines) + "\n"
-
-
-def about(columns: Mapping[str, Array], renamed: Mapping[str, str]) -> str:
-    """Return rows, rate, rest and sensor of a record in words."""
-    times = columns["time_s"]
-    measured = next(h for h in renamed.values() if not h.startswith(("drive_", CURRENT, COMMAND)))
-    values = columns[measured]
-    present = np.flatnonzero(np.isfinite(values))
-    first = values[present[:FEWEST_REST_SAMPLES]]
-    moved = np.flatnonzero(np.abs(values[present] - np.median(first)) > BEYOND_REST * np.ptp(first))
-    n_rest = int(present[moved[0]]) if moved.size and stands_still(first, 0.0, False) else 0
-    shorter = f"fewer than {FEWEST_REST_SAMPLES} rows of rest first"
-    rest = f"{times[n_rest] - times[0]:.3g} s of rest first" if n_rest >= FEWEST_REST_SAMPLES else shorter
-    sensor = sensor_of(values[present])
-    step = f"steps of {sensor.step:.3g}" if sensor.step else "a fine sensor"
-    hold = f", renewed every {sensor.hold} rows" if sensor.hold > 1 else ""
-    return f"{times.size} rows at {1.0 / np.median(np.diff(times)):.4g} Hz, {rest}; {measured}: {step}{hold}"

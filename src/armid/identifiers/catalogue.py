@@ -149,25 +149,14 @@ def of_phases(
         if dot and name in named:
             named[name][option] = value
         elif key not in own:
-            meant = [
-                f"{n}.{option or key}" for p, n in zip(phases, names, strict=True) if takes(p, option or key, value)
-            ]
-            said = f"those of a phase carry its name, {', '.join(f'{name}.OPTION' for name in named)}"
-            hint = nearest(key, meant) if meant else "; ".join([*([nearest(key, own)] if own else []), said])
-            raise ArmidError(f"{whose} has no option '{key}', {hint}")
+            near = f"{nearest(key, own)}; " if own else ""
+            raise ArmidError(f"{whose} has no option '{key}', {near}those of a phase carry its name, "
+                             f"{', '.join(f'{name}.OPTION' for name in named)}")  # fmt: skip
     return tuple(
         # a multistart passes options on by name
         phase.with_options(named[n] if phase.name == n else {f"{n}.{option}": v for option, v in named[n].items()})
         for phase, n in zip(phases, names, strict=True)
     )
-
-
-def takes(phase: Identifier, option: str, value: Any) -> bool:
-    try:
-        phase.with_options({option: value}).build(100)
-    except ArmidError:
-        return False
-    return True
 
 
 def identifier_of(name: str, known: Mapping[str, Identifier]) -> Identifier:

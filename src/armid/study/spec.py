@@ -244,26 +244,39 @@ class SuiteSpec:
 
 @dataclass(frozen=True, kw_only=True)
 class EntrySpec:
-    """Declare an [[identifiers]] entry; what is not given is as the study has it."""
+    """Declare an [[identifiers]] entry; what is not given is as the study has it, see `armid.study.tasks`.
+
+    noise_deg_s: once filled in, levels in the unit of the records, see `NOISES`.
+    """
 
     name: str = field(metadata=key(
         name_in("identifiers"), "the name of an identifier",
         "The optimiser, or a chain such as pso+bobyqa; `armid list identifiers` shows them.",
     ))  # fmt: skip
-    label: str | None = field(
-        default=None, metadata=key(line_of_text, "a text on one line", "Its name on pages, where that is another.")
+    label: str = field(
+        default="", metadata=key(line_of_text, "a text on one line", "Its name on pages, where that is another.")
     )
-    budget: tuple[int, ...] | None = field(default=None, metadata=BUDGETS)
-    budget_per_parameter: tuple[int, ...] | None = field(default=None, metadata=PER_PARAMETER)
-    fitness: tuple[str, ...] | None = field(default=None, metadata=FITNESSES)
-    noise_deg_s: tuple[float, ...] | None = field(default=None, metadata=levels("deg/s"))
-    noise_deg: tuple[float, ...] | None = field(default=None, metadata=levels("deg"))
-    noise_mm_s: tuple[float, ...] | None = field(default=None, metadata=levels("mm/s"))
-    noise_mm: tuple[float, ...] | None = field(default=None, metadata=levels("mm"))
-    seeds: tuple[int, ...] | None = field(default=None, metadata=SEEDS_KEY)
+    budget: tuple[int, ...] = field(default=(), metadata=BUDGETS)
+    budget_per_parameter: tuple[int, ...] = field(default=(), metadata=PER_PARAMETER)
+    fitness: tuple[str, ...] = field(default=(), metadata=FITNESSES)
+    noise_deg_s: tuple[float, ...] = field(default=(), metadata=levels("deg/s"))
+    noise_deg: tuple[float, ...] = field(default=(), metadata=levels("deg"))
+    noise_mm_s: tuple[float, ...] = field(default=(), metadata=levels("mm/s"))
+    noise_mm: tuple[float, ...] = field(default=(), metadata=levels("mm"))
+    seeds: tuple[int, ...] = field(default=(), metadata=SEEDS_KEY)
     options: Mapping[str, Any] = field(default_factory=dict, metadata=key(
         options, "a number, a text, true or false", "Its options; `armid list identifiers --long` shows them.",
     ))  # fmt: skip
+
+    @property
+    def largest_budget(self) -> int:
+        """Largest budget of a run; with budgets a parameter alone, that of one parameter."""
+        return max(self.budget or self.budget_per_parameter)
+
+    def budgets(self, n_free: int) -> list[int]:
+        """Return the budgets of its runs: those for each free parameter where there are any, the others cut them."""
+        most = max(self.budget, default=sys.maxsize)
+        return sorted({min(most, factor * n_free) for factor in self.budget_per_parameter}) or [*self.budget]
 
 
 @dataclass(frozen=True, kw_only=True)

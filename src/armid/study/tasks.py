@@ -12,10 +12,9 @@ names in tables), n_runs, and
 
 import errno
 import json
-import sys
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from datetime import UTC, datetime
 from functools import cache, cached_property
 from itertools import combinations, product
@@ -153,33 +152,6 @@ def versions() -> dict[str, str]:
 
 
 @dataclass(frozen=True, eq=False)
-class Entry:
-    """One identifier of a study with all that was left to the study filled in.
-
-    several: budgets of its runs. per_parameter: simulations a free parameter, used instead where there are any; no run
-    then has more than the largest of `several`, where there are any.
-    """
-
-    label: str
-    name: str
-    options: Mapping[str, Any]
-    several: tuple[int, ...]
-    fitness: tuple[str, ...]
-    noise_deg_s: tuple[float, ...]
-    seeds: tuple[int, ...]
-    per_parameter: tuple[int, ...]
-
-    @property
-    def budget(self) -> int:
-        """Largest budget of a run; with budgets a parameter alone, that of one parameter."""
-        return max(self.several or self.per_parameter)
-
-    def budgets(self, n_free: int) -> list[int]:
-        most = max(self.several, default=sys.maxsize)
-        return sorted({min(most, factor * n_free) for factor in self.per_parameter}) or [*self.several]
-
-
-@dataclass(frozen=True, eq=False)
 class Study:
     """A study that identifies, read and found possible; campaigns are looked for in its folder."""
 
@@ -189,7 +161,7 @@ class Study:
     text: str
     folder: Path
     cases: tuple[Case, ...]
-    entries: tuple[Entry, ...]
+    entries: tuple[EntrySpec, ...]
     registry: StudyRegistry
 
     @property
@@ -239,7 +211,7 @@ class Study:
         for entry in self.entries:
             if self.registry.digests_of("identifiers", entry.name):
                 settings = {"kind": self.kind, "only_built": True, "identifier": entry.name,
-                            "options": dict(entry.options), "budget": entry.budget}  # fmt: skip
+                            "options": dict(entry.options), "budget": entry.largest_budget}  # fmt: skip
                 outcome = performed(MissingRun(entry.label, json.dumps(settings)))
                 if outcome.status == FAILED:
                     raise ArmidError(f"identifier '{entry.label}': it cannot be built: {outcome.error}")
@@ -287,7 +259,7 @@ class Study:
             "identifiers": list(dict.fromkeys(self.labels)),
             "plugins": list(self.registry.plugins),
             "cases": [_case_description(case) for case in self.cases],
-            "budget_per_parameter": sorted({m for e in self.entries for m in e.per_parameter}),
+            "budget_per_parameter": sorted({m for e in self.entries for m in e.budget_per_parameter}),
             "published": {case.name: dict(case.published) for case in self.cases if case.published},
         }
 
@@ -311,13 +283,13 @@ class Study:
         seeds = {id(entry): len(set(entry.seeds)) for entry in self.entries}
         return sum(seeds[id(e)] * len(self._choices(case, e)) for case in self.cases for e in self.entries)
 
-    def _choices(self, case: Case, entry: Entry) -> list[tuple[Any, ...]]:
+    def _choices(self, case: Case, entry: EntrySpec) -> list[tuple[Any, ...]]:
         """Return window, noise, fitness and budget of the runs of one seed."""
         noises = entry.noise_deg_s if case.strokes else (None,)
         fitnesses = entry.fitness if case.suite is None else (case.suite.definition.fitness,)
         return list(product(self.spec.windows_s, noises, fitnesses, entry.budgets(len(case.bounds))))
 
-    def _runs(self, case: Case, shared: dict[str, Any], entry: Entry, seed: int) -> Iterator[Planned]:
+    def _runs(self, case: Case, shared: dict[str, Any], entry: EntrySpec, seed: int) -> Iterator[Planned]:
         for window, noise, fitness, budget in self._choices(case, entry):
             own = self.registry.digests_of("fitness", fitness) | self.registry.digests_of("identifiers", entry.name)
             settings = shared | {
@@ -372,19 +344,19 @@ class Study:
         })  # fmt: skip
 
 
-def _entries(spec: StudySpec, unit: str, registry: StudyRegistry, where: str) -> tuple[Entry, ...]:
+def _entries(spec: StudySpec, unit: str, registry: StudyRegistry, where: str) -> tuple[EntrySpec, ...]:
     """Return the identifiers of a study, each built once with its budget to see that it can be; unit: of records."""
-    entries: list[Entry] = []
+    entries: list[EntrySpec] = []
     for i, table in enumerate(spec.identifiers):
         name = table.get("label", table.get("name"))
         at = f"{where}, identifier {quoted(name) if isinstance(name, str) else i + 1}"
         _refuse_options(table, registry, at)
         own = validated(EntrySpec, table, at)
         noise = _levels(own, spec, unit, where, at)
-        entry = Entry(own.label or own.name, own.name, dict(own.options), own.budget or spec.budget,
-                      own.fitness or spec.fitness, noise, own.seeds or spec.seeds,
-                      own.budget_per_parameter or spec.budget_per_parameter)  # fmt: skip
-        if not (entry.several or entry.per_parameter):
+        left = {word: getattr(own, word) or getattr(spec, word)
+                for word in ("budget", "budget_per_parameter", "fitness", "seeds")}  # fmt: skip
+        entry = replace(own, label=own.label or own.name, noise_deg_s=noise, **left)
+        if not (entry.budget or entry.budget_per_parameter):
             raise ArmidError(f"{where}: key 'budget' is missing, {BUDGETS['expected']} is expected")
         _check_built(entry, registry, at)
         entries.append(entry)
@@ -409,7 +381,7 @@ def _levels(own: EntrySpec, spec: StudySpec, unit: str, where: str, at: str) -> 
     levels: tuple[float, ...] = (0.0,)
     for of, end in NOISES.items():
         key = f"noise_{end}"
-        sheet, place = (spec, where) if getattr(own, key) is None else (own, at)
+        sheet, place = (own, at) if getattr(own, key) else (spec, where)
         if of == unit:
             levels = getattr(sheet, key)
         elif any(getattr(sheet, key)):
@@ -418,7 +390,7 @@ def _levels(own: EntrySpec, spec: StudySpec, unit: str, where: str, at: str) -> 
     return levels
 
 
-def _check_built(entry: Entry, registry: StudyRegistry, where: str) -> None:
+def _check_built(entry: EntrySpec, registry: StudyRegistry, where: str) -> None:
     """Refuse an identifier that cannot be built with its options and budget, or cannot minimise its fitness.
 
     One of the user is built later, see `Study.check`: whatever its function does has to happen in another process.
@@ -430,12 +402,12 @@ def _check_built(entry: Entry, registry: StudyRegistry, where: str) -> None:
             identifier.refuse(fitness)
         built = identifier.with_options(entry.options)
         if not registry.digests_of("identifiers", entry.name):
-            built.build(entry.budget)
+            built.build(entry.largest_budget)
     except ArmidError as error:
         raise ArmidError(f"{where}: {error}") from error
 
 
-def _check_noise(entry: Entry, cases: Sequence[Case], registry: StudyRegistry, where: str) -> None:
+def _check_noise(entry: EntrySpec, cases: Sequence[Case], registry: StudyRegistry, where: str) -> None:
     """Refuse noise that would be added to no record, and a fitness that needs noise on records without noise."""
     at = f"{where}, identifier '{entry.label}'"
     simulated, end = any(case.strokes for case in cases), NOISES.get(cases[0].model.plant.output_unit, "")

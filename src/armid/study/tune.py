@@ -24,12 +24,13 @@ from armid.study.analyses.convergence import area_over_curve
 from armid.study.cases import suite_cases
 from armid.study.results import StudyResults, load_study
 from armid.study.runner import Ending, Progress, run
+from armid.study.spec import EntrySpec
 from armid.study.store import DONE
-from armid.study.tasks import Entry, Study
+from armid.study.tasks import Study
 
 # Identifier -> option -> range: whole numbers where both ends are; in the logarithm where they are 10 times apart.
 RANGES = {name: ranges for name, identifier in IDENTIFIERS.items() if (ranges := {
-    option.name: tune for option in options_in(identifier.algorithm) if (tune := option.metadata["option"].tune)
+    option.name: ends for option in options_in(identifier.algorithm) if (ends := option.metadata["option"].tune)
 })}  # fmt: skip
 
 
@@ -58,7 +59,7 @@ def tune(
     if find_spec("optuna") is None:
         raise ArmidError("armid tune needs the package optuna, which is not installed: "
                          "pip install 'armid[suite]' is expected")  # fmt: skip
-    tried: dict[str, list[Entry]] = {entry.label: [] for entry in first.entries}
+    tried: dict[str, list[EntrySpec]] = {entry.label: [] for entry in first.entries}
     areas: dict[str, float] = {}
     endings: list[Ending] = []
     for i in range(n):
@@ -97,7 +98,7 @@ def training(study: Study, seed: int) -> Study:
     both = {case.name for case in cases} & set(study.case_names)
     if both:
         raise ArmidError(f"study '{study.name}': {min(both)} is in train and in instances, each in one is expected")
-    entries = [replace(e, seeds=(seed,), per_parameter=e.per_parameter[-1:], several=e.several[-1:])
+    entries = [replace(e, seeds=(seed,), budget_per_parameter=e.budget_per_parameter[-1:], budget=e.budget[-1:])
                for e in tunable(study)]  # fmt: skip
     if not entries:
         raise ArmidError(f"study '{study.name}' has nothing to tune, one of {', '.join(RANGES)} without options is "
@@ -106,11 +107,13 @@ def training(study: Study, seed: int) -> Study:
     return replace(study, spec=spec, cases=tuple(cases), entries=tuple(entries))
 
 
-def tunable(study: Study) -> list[Entry]:
+def tunable(study: Study) -> list[EntrySpec]:
     """Return the identifiers whose options can be tuned, those of one label or of one budget once."""
-    entries: list[Entry] = []
+    entries: list[EntrySpec] = []
     for entry in study.entries:
-        same = any(e.label == entry.label or (e.name, e.budget) == (entry.name, entry.budget) for e in entries)
+        same = any(
+            e.label == entry.label or (e.name, e.largest_budget) == (entry.name, entry.largest_budget) for e in entries
+        )
         if entry.name in RANGES and not entry.options and not same:
             entries.append(entry)
     return entries
@@ -156,9 +159,9 @@ def tuned_study(study: Study, tunings: list[Tuned]) -> str:
             while label in entries:  # of a study that was tuned before
                 label += " again"
             text += f"label = {json.dumps(label, ensure_ascii=False)}\n"
-            text += f"budget = {list(entry.several)}\n" if entry.several != spec.budget else ""
-            if entry.per_parameter != spec.budget_per_parameter:
-                text += f"budget_per_parameter = {list(entry.per_parameter)}\n"
+            text += f"budget = {list(entry.budget)}\n" if entry.budget != spec.budget else ""
+            if entry.budget_per_parameter != spec.budget_per_parameter:
+                text += f"budget_per_parameter = {list(entry.budget_per_parameter)}\n"
             text += f"seeds = {list(entry.seeds)}\n" if entry.seeds != spec.seeds else ""
             text += f"options = {{ {options} }}"
     return f"{text}\n"
