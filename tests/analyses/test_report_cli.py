@@ -132,19 +132,6 @@ def test_a_report_that_fails_leaves_nothing(store, tmp_path, monkeypatch):
     assert [p.name for p in tmp_path.iterdir()] == ["study.sqlite"]
 
 
-def test_export_of_a_real_store_loads(store, run, tmp_path):
-    import iohinspector
-
-    assert "wrote 4 runs in 4 files" in run("export", "ioh", store, tmp_path / "ioh").out
-    manager = iohinspector.DataManager()
-    manager.add_folder(str(tmp_path / "ioh"))
-    rows = manager.load(monotonic=False, include_meta_data=True).to_pandas()
-    values = load_study(store).runs.set_index(["identifier", "seed"])["value"]
-    ends = rows.groupby(["algorithm_name", "instance"])["raw_y"].last()
-    assert {key: ends[key] for key in ends.index} == {key: values[key] for key in values.index}
-    assert rows.groupby("data_id")["evaluations"].agg(["first", "last"]).to_numpy().tolist() == [[1, 30]] * 4
-
-
 def test_a_folder_that_holds_something_is_not_mixed_with(store, refused, tmp_path):
     (tmp_path / "mine.txt").write_text("")
     assert "is not empty" in refused("export", "ioh", store, tmp_path)

@@ -35,15 +35,6 @@ def test_running_time_by_hand():
     assert successes.tolist() == [2, 0]
 
 
-def test_it_is_the_mean_cost_of_restarting_until_there_is_a_success():
-    """Independent trials: success with p after h, else all of the budget; restarted until one succeeds."""
-    rng = np.random.default_rng(3)
-    p, hit, budget = 0.3, 40.0, 100.0
-    hits = np.where(rng.random(20_000) < p, hit, np.inf)[:, np.newaxis]
-    ert, _ = expected_running_time(hits, np.full(20_000, budget))
-    assert ert[0] == pytest.approx(hit + (1 - p) / p * budget, rel=0.03)
-
-
 def test_table_takes_the_tolerances_and_counts_hits():
     evidence = SimpleNamespace(runs=pd.DataFrame({"setting": "s", "variant": ["pso"] * 2}), used=np.full(2, 1000.0))
     hits = np.full((2, 51), np.inf)

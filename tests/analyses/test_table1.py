@@ -4,7 +4,6 @@ import numpy as np
 import pandas as pd
 import pytest
 from made_results import PAPER_CASES
-from scipy.stats import binom
 
 from armid.study.analyses.analysis import Evidence, published_values
 from armid.study.analyses.table1 import median_interval, percentile_among, table1_rows
@@ -49,20 +48,6 @@ def test_the_last_four_rows_are_means_beside_the_papers(rows):
 def test_percentile_counts_equal_ones_by_half_and_failed_runs_as_worse():
     assert percentile_among([1.0, 2.0, 3.0, np.inf], 2.0) == 37.5
     assert percentile_among([1.0, 2.0], 9.0) == 100.0
-
-
-def exact_interval(sample, confidence=0.95):
-    """For odd n the median of a resample is the k-th value or less with P(Bin(n, k/n) >= (n + 1)/2)."""
-    n, ordered = len(sample), np.sort(sample)
-    below = binom.sf((n + 1) / 2 - 1, n, np.arange(1, n + 1) / n)
-    tail = (1.0 - confidence) / 2.0
-    return ordered[np.searchsorted(below, tail)], ordered[np.searchsorted(below, 1.0 - tail)]
-
-
-def test_the_interval_of_a_median_against_the_exact_distribution():
-    for n in (25, 101):
-        sample = np.arange(n, dtype=float)
-        assert median_interval(sample) == pytest.approx(exact_interval(sample), abs=1.0)
 
 
 def test_intervals_of_one_value_of_any_order_and_of_large_samples_in_batches():

@@ -91,29 +91,6 @@ def test_an_axis_without_a_value_for_its_mass(refused, write_axis, tmp_path):
     assert "parameter 'mass' has no nominal value: a value is expected (kg)" in sentence
 
 
-@pytest.mark.parametrize("folder_is_there", [True, False])
-def test_nothing_half_written_stays(run, paper_arm_folder, tmp_path, monkeypatch, folder_is_there):
-    from armid.record import write_table
-
-    def failing(path, columns):
-        if path.name == "raise.csv":
-            raise OSError(28, "No space left on device", str(path))
-        write_table(path, columns)
-
-    out = tmp_path / "out"
-    if folder_is_there:
-        out.mkdir()
-        (out / "lower.csv").write_text("of yesterday\n")
-    monkeypatch.setattr("armid.problem.simulated.write_table", failing)
-    ran = run("simulate", paper_arm_folder, "--out", out)
-    assert ran.code == 2
-    assert "raise.csv cannot be used: No space left on device" in ran.err
-    if folder_is_there:
-        assert [(p.name, p.read_text()) for p in out.iterdir()] == [("lower.csv", "of yesterday\n")]
-    else:
-        assert not out.exists()
-
-
 def test_steps_that_are_too_long_are_told(run, paper_arm_folder, tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("default")

@@ -1,5 +1,5 @@
 """Whatever ends a runner or a worker: no finished run is lost, none is there twice, and the rest is made as if nothing
-had been; and the clock may jump."""
+had been."""
 
 import os
 import random
@@ -18,15 +18,6 @@ from armid.study.store import FILE_NAME
 
 SEEDS = 6
 N_RUNS = SEEDS * RUNS_A_SEED
-# What a process has of the wall clock goes back by an hour at every look.
-BACKWARD = """\
-import itertools
-import time
-
-now, steps = time.time(), itertools.count(1)
-time.time = lambda: now - 3600.0 * next(steps)
-time.time_ns = lambda: int(time.time() * 1e9)
-"""
 
 
 def kept(out):
@@ -147,14 +138,3 @@ def test_ctrl_c_keeps_what_is_finished_and_says_how_to_go_on(start, write_study,
     n = int(re.search(r"(\d+) of 960 are in", out)[1])
     assert n == len(load_study(tmp_path / "out").runs) > 3
     assert [p.name for p in (tmp_path / "out").iterdir()] == [FILE_NAME]
-
-
-@pytest.mark.slow
-def test_a_clock_that_runs_backward_changes_nothing(start, write_study, tmp_path, undisturbed):
-    (tmp_path / "clock").mkdir()
-    (tmp_path / "clock" / "sitecustomize.py").write_text(BACKWARD)
-    path = os.pathsep.join(filter(None, [str(tmp_path / "clock"), os.environ.get("PYTHONPATH")]))
-    told = {"env": os.environ | {"PYTHONPATH": path}}
-    out = ended_well(start(write_study(SEEDS), "--out", tmp_path / "out", "--jobs", 2, "--time-limit", 60, **told))
-    assert f"{N_RUNS} of {N_RUNS} are in" in out
-    assert same_results(load_study(tmp_path / "out"), undisturbed)

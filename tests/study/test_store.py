@@ -3,8 +3,6 @@
 import os
 import signal
 import sqlite3
-import subprocess
-import sys
 import threading
 from contextlib import closing
 
@@ -46,29 +44,6 @@ def test_a_second_process_is_refused_and_the_first_goes_on(store, tmp_path):
         Store(tmp_path)
     assert store.save(Outcome("a0", DONE))
     assert len(load_study(tmp_path).runs) == 1
-
-
-HOLDER = """
-import sys, time
-from pathlib import Path
-from armid.study.store import Store
-
-store = Store(Path(sys.argv[1]))
-print("open", flush=True)
-time.sleep(600)
-"""
-
-
-def test_a_killed_process_keeps_nobody_out(tmp_path):
-    command = [sys.executable, "-c", HOLDER, str(tmp_path)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout.readline() == "open\n"
-        with pytest.raises(ArmidError, match="another process is at the runs of"):
-            Store(tmp_path)
-        process.kill()
-    with Store(tmp_path) as store:
-        store.plan(DESCRIPTION, planned(2))
-        assert runs(store) == ["a0", "a1"]
 
 
 def test_a_run_is_kept_once(store):

@@ -29,20 +29,16 @@ def success_rates(runs: DataFrame, tolerances: Sequence[float] = SUCCESS_TOLERAN
 
     A failed run is not a success. Source: Wilson, J. Am. Stat. Assoc. 22 (1927) 209.
     """
+    from statsmodels.stats.proportion import proportion_confint
+
     rows = []
     for key, group in runs.dropna(subset=["largest_error"]).groupby(["setting", "variant"], sort=False):
         errors = group["largest_error"].to_numpy()
         for tolerance in tolerances:
             n = int(np.count_nonzero(errors <= tolerance))
-            rows.append((*key, tolerance, errors.size, n, n / errors.size, *wilson(n, errors.size)))
+            interval = proportion_confint(n, errors.size, method="wilson")
+            rows.append((*key, tolerance, errors.size, n, n / errors.size, *interval))
     return DataFrame(rows, columns=["setting", "variant", "tolerance", "n", "successes", "rate", "low", "high"])
-
-
-def wilson(successes: int, n: int, confidence: float = 0.95) -> tuple[float, float]:
-    from statsmodels.stats.proportion import proportion_confint
-
-    low, high = proportion_confint(successes, n, alpha=1.0 - confidence, method="wilson")
-    return float(low), float(high)
 
 
 def success(rates: DataFrame) -> Table:
