@@ -16,14 +16,10 @@ ERROR_LABEL = "largest relative error [%]"
 # Smaller values are drawn there.
 LEAST_PERCENT, LEAST_FITNESS = 1e-6, 1e-16
 ERROR_CAPTION = (
-    "Largest relative error of the best candidate so far against simulations: median over all cases and seeds. The "
-    "error may rise, since the fitness decides what is best. Errors below 1e-6 % are drawn there. A run that stops "
-    "early keeps its value up to its budget, where its line ends. Your own identifiers and the best have a colour."
+    "Largest relative error of the best candidate so far against simulations: median over all cases and seeds, drawn "
+    "from 1e-6 % on. The error may rise, since the fitness decides what is best."
 )
-FITNESS_CAPTION = (
-    "Smallest value of the fitness {fitness} so far (of a similarity: 1 minus its degree) against simulations: median "
-    "over all cases and seeds. Your own identifiers and the best have a colour."
-)
+FITNESS_CAPTION = "Smallest value of {fitness} so far against simulations: median over all cases and seeds."
 
 
 def parts(evidence: Evidence) -> Sequence[Part]:
@@ -79,14 +75,12 @@ def convergence_figure(evidence: Evidence, own: NDArray[np.bool_], values: Array
 
 
 ATTAINED_CAPTION = (
-    "Share of all pairs of a run and a target that are hit within so many simulations a parameter: the empirical "
-    "attainment function, mean over targets. The 51 targets are what is left of the way from a first candidate to the "
-    "fitness of the truth, evenly spread in the logarithm from all to 1e-10."
+    "Share of all pairs of a run and a target that are hit within so many simulations a parameter. The 51 targets are"
+    " shares of the way from a first candidate to the fitness of the truth, from all of it to 1e-10."
 )
 AREA_CAPTION = (
-    "Area over the convergence curve: mean over the targets of the share of the budget, in its logarithm, that is left "
-    "when the target is first hit; 1 hits all at once, 0 none. Over all cases and seeds, quartiles and mean. "
-    "Targets as in the figure."
+    "Mean over the targets of the figure of the share of the budget, in its logarithm, that is left when a target is "
+    "first hit. 1 hits all at once, 0 none; over all cases and seeds."
 )
 
 

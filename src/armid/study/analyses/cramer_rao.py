@@ -35,17 +35,14 @@ SUMMARY_CAPTION = (
     "cases lie between 0.9 and 1.1, and the largest absolute bias/bound."
 )
 TABLE_CAPTION = (
-    "deviation/bound: sample standard deviation of the estimates over the noise realisations (seeds), divided by the "
-    "Cramer-Rao bound (median over the runs of the bound at the solution); its 95 % interval from the chi-square "
-    "distribution, right for normal estimates. 1 is the best that an unbiased estimate can do. from quartiles: the "
-    "same ratio from the distance of the quartiles, which single lost runs do not move. bias/bound: (mean - "
-    "truth)/bound with the half width of its 95 % interval. yes: the ratio lies between 0.9 and 1.1. Runs on a bound "
-    "of the box make the ratio too small."
+    "deviation/bound: sample standard deviation over the noise realisations (seeds), divided by the Cramer-Rao bound "
+    "at the solution, with its 95 % interval (chi-square); 1 is the best of an unbiased estimate. from quartiles: the"
+    " same from the distance of the quartiles, which lost runs do not move. bias/bound: (mean - truth)/bound with the"
+    " half width of its 95 % interval. Runs on a bound of the box make the ratio too small."
 )
 FIGURE_CAPTION = (
-    "Standard deviation over the noise realisations divided by the Cramer-Rao bound, with its 95 % interval, a mark "
-    "a case and a colour an identifier. The band spans 0.9 to 1.1; left of 1 by more than chance would be too good to "
-    "be true, unless a bound of the box holds runs back."
+    "Standard deviation over the noise realisations divided by the Cramer-Rao bound, with its 95 % interval. The band"
+    " spans 0.9 to 1.1; a mark is a case, a colour an identifier."
 )
 TITLE = "Scatter against the Cramer-Rao bound"
 

@@ -19,14 +19,12 @@ VALLEY = ("p0", "eta3", "n", "k")
 MOST_PARAMETERS, MOST_ERRORS_DRAWN = 4, 600
 OTHERS = "all others"
 MAP_CAPTION = (
-    "Largest relative error of a run [%], median over the seeds, by identifier and case, one map a noise level, "
-    "the best identifier (over all) on top. The colours are logarithmic over the errors shown, at most from 1e-6 % to "
-    "100 %."
+    "Largest relative error of a run [%], median over the seeds; the identifier that is best over all maps on top. "
+    "The colours are logarithmic, from 1e-6 % to 100 % at most."
 )
 VALLEY_CAPTION = (
-    "Deviation (value - truth)/truth [%] of the results of all finished runs in each pair of parameters, one mark a "
-    "run; counts on the diagonal. Near 0 the axes are linear, further out logarithmic. Where marks lie along a line, "
-    "parameters compensate each other. Of more than 600 runs of one identifier every n-th is drawn."
+    "Deviation (value - truth)/truth [%] of the results in each pair of parameters, one mark a run; counts on the "
+    "diagonal. Where marks lie along a line, parameters compensate each other."
 )
 
 

@@ -21,15 +21,13 @@ COLUMNS = (
     Column("correlation", "rank correlation", ".2f"),
 )  # fmt: skip
 TABLE_CAPTION = (
-    "Which fitness gives right parameters: the largest relative error of a run, median and worst over cases and seeds "
-    "(a failed run counts as infinite), and 1 - S, the similarity degree that the result reached on the train "
-    "records whatever was minimised (median). rank correlation: Spearman's, over the runs of the line, between 1 - S "
-    "and the largest error; near 1 a higher similarity means better parameters, near 0 it says nothing about them."
+    "Largest relative error of a run over cases and seeds (a failed run counts as infinite), and 1 - S, where S is "
+    "the similarity degree of the result on the train records. rank correlation: Spearman's, between 1 - S and that "
+    "error; near 1 a higher similarity means better parameters, near 0 it says nothing about them."
 )
 FIGURE_CAPTION = (
-    "Largest relative error of the result of each run, one mark a run and one strip a fitness; the line is the median "
-    "of the strip. A fitness that gives right parameters is left. Failed runs are left out; errors below 1e-14 % are "
-    "drawn there. Your own identifiers and the best have a colour."
+    "Largest relative error of each run, one strip a fitness with its median as a line. A fitness that gives right "
+    "parameters is left; failed runs are left out."
 )
 
 

@@ -15,23 +15,20 @@ from armid.study.analyses.analysis import N_RUNS, PAPER, PARAMETER, SETTING, VAR
 from armid.units import scale_of
 
 OVERVIEW_CAPTION = (
-    "Relative error abs(value - truth)/abs(truth) in %, mean and median over all finished runs (cases and seeds "
-    "together); simulations: median of a run. "
-    "'largest' is the largest error among the parameters of one run: its median, 95th percentile and "
-    "worst over the runs; a failed run counts as infinite there."
+    "Relative error abs(value - truth)/abs(truth) in %, mean and median over all finished runs; simulations: median "
+    "of a run. 'largest' is the largest error among the parameters of one run: its median, 95th percentile and worst "
+    "over the runs, where a failed run counts as infinite."
 )
 PAPER_CAPTION = (
     f" The line '{PAPER}' is computed from the values that the paper printed, one run a row, on its own data."
 )
 VALUES_CAPTION = (
-    "No truth is known. Median and population standard deviation of each parameter over all finished runs. "
-    "Cramer-Rao: standard deviation at the solution (median). RMSE: of the result on train and holdout records "
-    "(medians). At a bound: runs whose parameter ended on its bound."
+    "Median and population standard deviation of each parameter over all finished runs. Cramer-Rao, RMSE: medians at "
+    "the solution; at a bound: runs whose parameter ended on its bound."
 )
 RUNS_CAPTION = (
-    "One line a noise and identifier. budget, used: simulations of a run (median used); diverged: share of the used "
-    "simulations that gave no finite record. failed: runs that ended in an error and hold no result. at a bound: runs "
-    "that ended with at least one parameter on a bound of the box."
+    "used: simulations of a run, median; diverged: share of these that gave no finite record. failed: runs without a "
+    "result; at a bound: runs that ended with a parameter on a bound of the box."
 )
 VALUES_COLUMNS = (
     SETTING, VARIANT, PARAMETER, Column("unit", "unit"), N_RUNS, Column("median", "median", ".6g"),

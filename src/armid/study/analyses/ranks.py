@@ -31,22 +31,16 @@ LEAST_CASES = 20
 EXACT_TEST_TO = 13
 INTRODUCTION = "How sure is it that one identifier is better than another on cases like these?"
 RANK_CAPTION = (
-    "Largest relative error of a run, median over the seeds: one number a case and identifier. A case is one block, "
-    "since its seeds are repeats and no independent evidence. Errors of 1e-6 % and below count as equal, and so do "
-    "those that differ by less than a hundredth of the Cramer-Rao bound. Rank 1 is the best of a case; the table shows "
-    "the mean over the cases. arrived: share of the runs that end within that distance, in each parameter, of the run "
-    "with the lowest fitness on the same noise; empty where nobody else has the fitness."
+    "Largest relative error of a run, median over the seeds: one number a case and identifier. Errors that differ by "
+    "less than a hundredth of the Cramer-Rao bound are alike, and so are those below 1e-6 %. Rank 1 is the best of a "
+    "case. arrived: share of the runs that end that near to the run with the lowest fitness on the same noise."
 )
 PAIRS_CAPTION = (
-    "Wilcoxon's signed-rank test of the logarithms of the same block values (two-sided, Pratt's rule for ties), "
-    "corrected after Holm over all {n} pairs of this setting. A12 is the probability that a run of the first has a "
-    "smaller error than a run of the second, over all runs, ties by half (Vargha and Delaney). With {n_cases} cases "
-    "the smallest p that the test can give before correction is {least:.2g}."
+    "Wilcoxon's signed-rank test of the logarithms of these values (two-sided, Pratt's rule), corrected after Holm "
+    "over {n} pairs; with {n_cases} cases the smallest p before correction is {least:.2g}. A12: probability that a "
+    "run of the first has a smaller error than a run of the second, ties by half."
 )
-FIGURE_CAPTION = (
-    "Mean ranks over the cases. A bar joins identifiers without a pair that differs significantly at 5 % (Wilcoxon "
-    "signed-rank, Holm)."
-)
+FIGURE_CAPTION = "Mean ranks over the cases. A bar joins identifiers that do not differ at 5 % (Wilcoxon, Holm)."
 
 
 def parts(evidence: Evidence) -> Sequence[Part]:
@@ -287,11 +281,10 @@ def critical_difference_figure(tests: RankTests, colours: Mapping[str, int]) -> 
 
 
 CLASS_CAPTION = (
-    "Rank of the fitness that a run ends with, median over the seeds, among all identifiers on a case; a fitness below "
-    "that of the truth, which fits the noise, counts as equal to it, and two that differ by less than 1e-8 are alike. "
-    "Mean over the cases, in brackets the 95 % interval of a bootstrap over the problems, whose instances are alike. "
-    "first: cases in which nobody is better. Then the mean in each class of difficulty, which was measured before any "
-    "search."
+    "Rank of the fitness that a run ends with, median over the seeds, among all identifiers on a case; values below "
+    "that of the truth, or apart by less than 1e-8, are alike. Mean over the cases, in brackets the 95 % interval of "
+    "a bootstrap over the problems. first: cases in which nobody is better; then the mean in each class of "
+    "difficulty."
 )
 CLASSES = ("smooth", "valley", "rugged", "plateau", "stair")
 # A fitness this near to that of the truth equals it: [rad/s], or of a similarity 1.
@@ -336,10 +329,9 @@ def class_ranks(evidence: Evidence) -> Table:
 
 
 PROBLEMS_CAPTION = (
-    "Measured on the first instance of each problem before any search. valley: condition of the derivatives of the "
-    "residuals at the truth. stair: share of steps of 0.1 % of the range that change nothing. plateau: share of steps "
-    "of 5 % that change next to nothing. minima: on a straight line through the truth, mean. holes: share of the box "
-    "where the simulation diverges."
+    "Measured on the first instance of each problem. valley: condition of the derivatives of the residuals at the "
+    "truth. stair, plateau: shares of steps of 0.1 % and 5 % of the range that change nothing or next to nothing. "
+    "minima: on a straight line through the truth. holes: share of the box where the simulation diverges."
 )
 
 
@@ -357,9 +349,8 @@ def problems(evidence: Evidence) -> Table:
 
 
 SWARM_CAPTION = (
-    "The swarm against each other identifier: median over the problems of the ratio of what both leave above 0 of the "
-    "fitness (above 1: the swarm leaves more), and the probability of Wilcoxon's signed-rank test on the problems, "
-    "corrected after Holm within a budget."
+    "Median over the problems of the ratio of what the swarm and the other leave of the fitness (above 1: the swarm "
+    "leaves more). p: Wilcoxon's signed-rank test on the problems, corrected after Holm within a budget."
 )
 
 

@@ -20,17 +20,14 @@ PAIRS_HIT = "share of (run, target) pairs hit"
 SHARE_AXES: Any = {"xscale": "log", "ylim": (0.0, 1.0)}
 # Of both targets.
 CAPTION = (
-    "ERT = (simulations of all runs until the target is first hit, all that were used where it is not) / (number of "
-    "runs that hit it), over all cases and seeds; inf where no run hits it. In brackets the share of runs that hit. "
-    "{target} A run that hits a target may leave it again, since the fitness and not the error decides what is best: "
-    "hits can exceed the success rates, which judge the end."
+    "ERT = (simulations of all runs until the target is first hit, or all that were used) / (number of runs that hit "
+    "it), over all cases and seeds; in brackets the share of runs that hit. {target} A run may leave a target again, "
+    "so that hits can exceed the success rates, which judge the end."
 )
 TARGET = "Target: the largest relative error of the best candidate so far is at the tolerance or below."
 ECDF_CAPTION = (
     "Share of all pairs of a run and a target that are hit within so many simulations. The 51 targets are largest "
-    "relative errors of the parameters, evenly spread in their logarithm from 100 % to 1e-8 %; a target is hit when "
-    "the best candidate so far (by fitness) is first that near to the truth. Your own identifiers and the best have "
-    "a colour, the others are grey. A run that stops early stays where it ended."
+    "relative errors of the parameters, from 100 % to 1e-8 %."
 )
 
 
@@ -111,14 +108,10 @@ def line_panels(
 SHARES_LEFT = (1e-1, 1e-3, 1e-5)
 N_OF_TIMES = 200
 BEST_TARGET = (
-    "Target: of the way from a first candidate (median of the first fitness of all runs on the case) to the best "
-    "fitness that any identifier found on the same case, noise and seed, no more than this share is left. Where "
-    "several fitnesses were run, each is compared with its own kind."
+    "Target: no more than this share is left of the way from a first candidate (median over all runs on the case) to "
+    "the best fitness that anyone found on the same case, noise and seed."
 )
-WATERFALL_CAPTION = (
-    "What each run leaves of the way from a first candidate to the best known fitness when it ends, sorted: a seed is "
-    "a start. A flat step above the lowest one is a local minimum that many starts end in; 1e-10 and below are alike."
-)
+WATERFALL_CAPTION = "What a run leaves of the way to the best fitness, sorted. A flat step is a local minimum."
 
 
 def best_fitness_parts(evidence: Evidence) -> Sequence[Part]:

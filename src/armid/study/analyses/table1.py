@@ -25,19 +25,14 @@ COLUMNS = (
     Column("percentile", "paper's error lies at [percentile of ours]", ".0f"), N_RUNS,
 )  # fmt: skip
 TABLE_CAPTION = (
-    "truth and paper: Table I as printed. ours: median over the seeds. Errors are abs(value - truth)/truth: of our "
-    "median, and the median and mean over the seeds with a 95 % percentile bootstrap interval of the median (2000 "
-    "resamples). Percentile: share of our runs that beat the paper on that row (ties count half); 90 means "
-    f"that nine in ten of our runs have a smaller error. The rows '{MEAN_ROW}' average over the "
-    "rows: the paper's errors, the errors of our medians, our median errors, and our mean errors (which is the mean "
-    "over rows and seeds). Our records are synthetic: simulated from the truth with estimated constants of the arm, "
-    "since the paper prints none."
+    "truth and paper: Table I as printed. ours: medians over the seeds, of records simulated from the truth with "
+    "estimated constants of the arm. 95 %: percentile bootstrap of the median. Percentile: share of our runs that "
+    f"beat the paper on that row (ties count half). The rows '{MEAN_ROW}' average over the rows."
 )
 FIGURE_CAPTION = (
-    "Relative error [%] on a logarithmic axis, all rows and seeds together: the box spans the quartiles, the thick "
-    "line is the median, the whiskers reach from the 5th to the 95th percentile, dots are the runs beyond. Diamonds "
-    "are the paper's errors on its rows, the vertical line is their mean. The colour is that of the identifier in all "
-    "figures, the dashes say the noise. Errors below 1e-9 % are drawn there."
+    "Relative error [%], all rows and seeds together: quartiles, median, and whiskers from the 5th to the 95th "
+    "percentile; the dashes say the noise. Diamonds are the paper's errors on its rows, the vertical line is their "
+    "mean."
 )
 LAYOUT_CAPTION = (
     "True value, identified value and relative error of each parameter. The values of the paper belong to its own arm, "

@@ -22,20 +22,15 @@ COLUMNS = (
 )  # fmt: skip
 IN_UNIT = ("truth", "mean", "deviation", "between", "within", "bound", "low", "high")
 TABLE_CAPTION = (
-    "mean and standard deviation: over all runs (records and repeats together); standard deviations are those of the "
-    "population, sqrt(mean (x - mean)^2), which is what the paper calls mean square error. between records: of the "
-    "means of the records, which the noise of the records makes; within a record: root mean square over the records "
-    "of the deviation among repeats on the same record, which the search makes. Cramer-Rao: median over the runs of "
-    "the bound at the solution for one record; where the misfit is far above the noise, the residual replaces the "
-    "noise and makes it wider. low, high: the box; at a bound: runs that ended on it, where the box and not the record "
-    "decides the value, and the other parameters scatter less than they would without it. The paper's lines are "
-    "computed from its five printed identifications of a real arm; ours are of records whose truth is known (a test "
-    "stand's, synthetic), so the two need not agree."
+    "mean and standard deviation (of the population, the paper's mean square error): over all runs. between records: "
+    "of the means of the records, which their noise makes; within a record: among repeats on it, which the search "
+    "makes. Cramer-Rao: median of the bound for one record. at a bound: runs that ended on the box, which then "
+    "decides the value. The paper's lines are its five identifications of a real arm, ours are synthetic: the two "
+    "need not agree."
 )
 FIGURE_CAPTION = (
-    "Result of each run, one mark a record and one colour an identifier; the paper's identifications of its measured "
-    "records above as diamonds. The line is the truth of the synthetic records, the grey band the truth +- one "
-    "Cramer-Rao standard deviation of one record (median over the runs), dotted lines are bounds of the box."
+    "Result of each run, one mark a record; the paper's identifications above as diamonds. The line is the truth of "
+    "the synthetic records, the band one Cramer-Rao deviation around it; dotted lines are bounds of the box."
 )
 
 
