@@ -402,7 +402,9 @@ def close_loop(
     values = {**(fixed or {}), **setup.fixed}
     chances = {name: float(p) for name, p in (priors or {}).items() if not isinstance(p, Sequence)}
     known_too = with_known(setup.campaign, {name: p for name, p in (priors or {}).items() if name not in chances})
-    share = {} if within is None else {"within": positive(within, "within")}
+    if within is not None and not (isfinite(within) and within > 0.0):
+        raise ArmidError(f"within is {within:g}: a number above 0 is expected")
+    share = {} if within is None else {"within": within}
     file = progress if isinstance(progress, Path) else None
     with status_line(progress is True) as shown, angles_in(known_too.angle):
         loop: ClosedLoop = run(setup.model, known_too, kept, rng, setup.bounds, values, threads, told or shown, curve,
@@ -422,12 +424,6 @@ def with_known(campaign: Campaign, given: Mapping[str, Sequence[float]]) -> Camp
             )
     known = {name: Known(mean=float(mean), sd=float(sd)) for name, (mean, sd) in given.items()}
     return replace(campaign, known={**campaign.known, **known})
-
-
-def positive(value: float, where: str) -> float:
-    if not (isfinite(value) and value > 0.0):
-        raise ArmidError(f"{where} is {value:g}: a number above 0 is expected")
-    return value
 
 
 def effects_of(given: Any, known: Mapping[str, Effect], where: str) -> Mapping[str, Effect]:

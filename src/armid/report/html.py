@@ -86,7 +86,7 @@ def inline(text: str, prefix: str, label: str, where: str = "a figure") -> Marku
         root = ElementTree.fromstring(text)
         if local(root.tag) != "svg":
             raise ArmidError(f"{where} holds <{local(root.tag)}>, an SVG is expected")
-        made = cleaned(root, prefix, referenced(root))
+        made = cleaned(root, prefix)
         made.attrib.pop("height", None)
         width = re.fullmatch(r"([\d.]+)pt", made.get("width", ""))
         made.attrib |= {"width": "100%", "role": "img", "aria-label": label}
@@ -101,21 +101,11 @@ def local(name: str) -> str:
     return name.rpartition("}")[2]
 
 
-def referenced(root: ElementTree.Element) -> set[str]:
-    ids: set[str] = set()
-    for element in root.iter():
-        for name, value in element.attrib.items():
-            ids |= set(REFERENCE.findall(value))
-            if local(name) == "href" and value.startswith("#"):
-                ids.add(value[1:])
-    return ids
-
-
-def cleaned(element: ElementTree.Element, prefix: str, used: set[str]) -> ElementTree.Element:
+def cleaned(element: ElementTree.Element, prefix: str) -> ElementTree.Element:
     name = local(element.tag)
     made = ElementTree.Element(name)
     for key, value in element.attrib.items():
-        kept = allowed(local(key), value, name, prefix, used)
+        kept = allowed(local(key), value, name, prefix)
         if kept is not None:
             made.set(local(key), kept)
     if element.get("id") in LAYERS:
@@ -125,13 +115,13 @@ def cleaned(element: ElementTree.Element, prefix: str, used: set[str]) -> Elemen
     for child in element:
         # comments have a function for a tag
         if isinstance(child.tag, str) and local(child.tag) in ELEMENTS:
-            made.append(cleaned(child, prefix, used))
+            made.append(cleaned(child, prefix))
     return made
 
 
-def allowed(key: str, value: str, element: str, prefix: str, used: set[str]) -> str | None:
+def allowed(key: str, value: str, element: str, prefix: str) -> str | None:
     """Return an attribute as it may stand on the page, None for one that may not."""
-    if key not in ATTRIBUTES or (key == "id" and value not in used):
+    if key not in ATTRIBUTES:
         return None
     if key == "id":
         return prefix + value

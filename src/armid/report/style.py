@@ -229,16 +229,10 @@ def thinned(values: Array, most: int = MOST_VECTOR_POINTS) -> NDArray[np.intp]:
     n = len(values)
     if n <= most:
         return np.arange(n)
-    edges = np.linspace(0, n, most // 2).astype(np.intp)
-    lows = np.minimum.reduceat(values, edges[:-1])
-    highs = np.maximum.reduceat(values, edges[:-1])
-    sizes = np.diff(edges)
-    chosen = [0, n - 1]
-    for extreme in (lows, highs):
-        equal = np.flatnonzero(values == np.repeat(extreme, sizes))
-        # the first sample of each interval that is its extreme
-        chosen += list(equal[np.unique(np.searchsorted(edges, equal, side="right"), return_index=True)[1]])
-    return np.unique(np.array(chosen, dtype=np.intp))
+    chosen = {0, n - 1}
+    for interval in np.array_split(np.arange(n), most // 2 - 1):
+        chosen |= {int(interval[0] + extreme(values[interval])) for extreme in (np.argmin, np.argmax)}
+    return np.array(sorted(chosen), dtype=np.intp)
 
 
 # Height of an upright panel with a name for each line at its side [inch].
