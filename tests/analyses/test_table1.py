@@ -6,7 +6,7 @@ import pytest
 from made_results import PAPER_CASES
 
 from armid.study.analyses.analysis import Evidence, published_values
-from armid.study.analyses.table1 import median_interval, percentile_among, table1_rows
+from armid.study.analyses.table1 import median_interval, table1_rows
 from armid.study.analyses.table2 import spread, table2
 
 PAPERS_MEANS = [0.487, 0.421, 0.171, 0.899]
@@ -43,11 +43,6 @@ def test_the_last_four_rows_are_means_beside_the_papers(rows):
     assert means["n"].tolist() == [35] * 4
     of_n = table[(table["parameter"] == "n") & (table["case"] != "mean of the rows")]
     assert means.iloc[-1]["mean_error"] == pytest.approx(of_n["mean_error"].mean())
-
-
-def test_percentile_counts_equal_ones_by_half_and_failed_runs_as_worse():
-    assert percentile_among([1.0, 2.0, 3.0, np.inf], 2.0) == 37.5
-    assert percentile_among([1.0, 2.0], 9.0) == 100.0
 
 
 def test_intervals_of_one_value_of_any_order_and_of_large_samples_in_batches():

@@ -96,10 +96,6 @@ def forms_of(effect: Effect) -> str:
     return f"{note_of(effect)} (forms: {words})" if words else note_of(effect)
 
 
-def recorded_by(plant: Plant) -> str:
-    return ", ".join(dict.fromkeys(o.unit for p in (plant, *plant.variants) for o in p.outputs))
-
-
 def plain_lines(name: str, thing: Any, registry: Registry, is_long: bool) -> list[str]:
     return [f"{name}: {note_of(thing)}{f' (records join by {thing.join})' if hasattr(thing, 'join') else ''}"]
 
@@ -204,7 +200,10 @@ def sibling_lines(plant: Plant, is_long: bool) -> list[str]:
 
 # Columns of the table of each catalogue, and the cells of one name after the name itself.
 SHORT_TABLES: dict[str, tuple[tuple[str, ...], Callable[[Any], Sequence[str]]]] = {
-    "plants": (("plant", "recorded in", "what it is"), lambda p: (recorded_by(p), note_of(p))),
+    "plants": (
+        ("plant", "recorded in", "what it is"),
+        lambda p: (", ".join(dict.fromkeys(o.unit for each in (p, *p.variants) for o in each.outputs)), note_of(p)),
+    ),
     "effects": (("effect", "at", "what it is"), lambda e: (", ".join(e.adds), forms_of(e))),
     "fitness": (("fitness", "records join by", "what it is"), lambda f: (f.join, note_of(f))),
     "analyses": (("analysis", "what it is"), lambda a: (note_of(a),)),

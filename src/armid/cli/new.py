@@ -73,8 +73,8 @@ def new_command(kind: str, name: str, style: str, files: tuple[Path, ...], out: 
     An effect, a fitness, an identifier, a plant or an analysis becomes FOLDER/NAME.py, a Python file that declares
     NAME. `armid check` tries it, `armid report` an analysis. A study becomes FOLDER/NAME.toml, which `armid study`
     runs. A campaign becomes the folder FOLDER/NAME with campaign.toml and two small records, which are synthetic and
-    say so; with --from FILE... it has copies of your records, and a comment at each guess. Nothing that exists is
-    overwritten.
+    say so; with --from FILE... it has copies of the columns that it uses, and a comment at each guess. Nothing that
+    exists is overwritten.
     """
     from armid.record import write_campaign
 
@@ -221,6 +221,12 @@ COUNT_ENDS = ("counts", "counts_s")
 TURNING_ENDS = {*SUFFIXES["rad/s"], *SUFFIXES["rad"]}
 # Share of equal neighbours from which on an input keeps its value between samples.
 KEPT = 0.5
+# Of a machine that turns or is linear: its lines of campaign.toml.
+GUESSED_MODELS = {
+    False: ('plant = "rotary_arm"  # GUESS: it turns; inertia, damping and the moment of gravity are searched,',
+            "# all per unit of the drive, as the gain is 1: a known one goes into [parameters.gain] as `fixed`"),
+    True: ('plant = "driven_axis"  # GUESS: a linear axis', 'effects = ["viscous"]  # GUESS: its speed is braked'),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -374,25 +380,18 @@ def seconds_of(column: Column, table: CsvTable, notes: list[str]) -> float:
 def rewritten(
     table: CsvTable, renamed: Mapping[str, str], time: str, second: float, drive: tuple[str, float]
 ) -> dict[str, Array]:
-    """Return the columns of a file under the headers of a record; numbers are kept where the unit is.
+    """Return the columns that are used under the headers of a record; numbers are kept where the unit is.
 
     drive: its header, and what its numbers are multiplied by.
     """
     for header in (time, *renamed):
-        table.numbers(header, gaps=header != time) if header in table.headers else missing(table, header)
+        if header not in table.headers:
+            raise ArmidError(f"{table.where}: no column {quoted(header)} is there, as in the first file: files of one "
+                             "machine with the same columns are expected")  # fmt: skip
+        table.numbers(header, gaps=header != time)
     times = table.columns[time] if second == 1.0 else np.round(table.columns[time] * second, 12)
-    taken = {"time_s", *renamed.values()}
-    # an encoder that is not used must not be taken for an output, which wants the counts of a turn
-    kept = {h: f"unused_{h}" if column_of(h).end in COUNT_ENDS else h for h in table.columns
-            if h not in (time, *renamed) and h not in taken and "," not in h}  # fmt: skip
-    others = {new: table.columns[h] for h, new in kept.items()}
     own = {new: table.columns[h] * (drive[1] if new == drive[0] else 1.0) for h, new in renamed.items()}
-    return {"time_s": times} | own | others
-
-
-def missing(table: CsvTable, header: str) -> None:
-    raise ArmidError(f"{table.where}: no column {quoted(header)} is there, as in the first file: files of one machine "
-                     "with the same columns are expected")  # fmt: skip
+    return {"time_s": times} | own
 
 
 def guessed_text(
@@ -402,27 +401,16 @@ def guessed_text(
     drives = [columns[renamed[roles["drive"].header]] for columns in written.values()]
     # One device drives all records: steps show that it holds, a chirp cannot.
     held = [float(np.mean(np.diff(drive) == 0.0)) > KEPT for drive in drives]
-    lines = ["# Written by `armid new campaign --from`: check each line with GUESS. The CSV files are copies with",
-             "# headers that armid reads. Numbers are those of the originals unless a line says so, times are in",
-             "# seconds.", "#"]  # fmt: skip
-    lines += [f"# {note}" for note in notes]
-    lines += [f'name = "{name}"']
-    if linear:
-        lines += [
-            'plant = "driven_axis"  # GUESS: a linear axis',
-            'effects = ["viscous"]  # GUESS: its speed is braked',
-        ]
-    else:
-        lines += [
-            'plant = "rotary_arm"  # GUESS: it turns; inertia, damping and the moment of gravity are searched,',
-            "# all per unit of the drive, as the gain is 1: a known one goes into [parameters.gain] as `fixed`",
-        ]
     stays = f"keeps its value from row to row in {held.count(True)} of {len(held)} files"
-    kept = stays if any(held) else "changes in each row"
-    lines += [f'hold = "{"zero" if any(held) else "linear"}"  # GUESS: the drive {kept}']
+    kept = ("zero", stays) if any(held) else ("linear", "changes in each row")
+    lines = [
+        "# Written by `armid new campaign --from`: check each line with GUESS. The CSV files are copies of the columns",
+        "# that are used, with headers that armid reads, numbers as in the originals but where a line says so, and",
+        "# times in seconds.", "#", *(f"# {note}" for note in notes), f'name = "{name}"', *GUESSED_MODELS[linear],
+        f'hold = "{kept[0]}"  # GUESS: the drive {kept[1]}',
+    ]  # fmt: skip
     wrapped = [new for old, new in renamed.items() for t in tables if wraps_at(t.columns[old], new)]
-    if wrapped:
-        lines += [f"unwrap = true  # {wrapped[0]} jumps by whole turns"]
+    lines += [f"unwrap = true  # {wrapped[0]} jumps by whole turns"] if wrapped else []
     for i, (file, columns) in enumerate(written.items()):
         last = i == len(written) - 1 and len(written) > 1
         times = columns["time_s"]

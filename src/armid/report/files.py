@@ -192,7 +192,7 @@ def group_lines(shown: Sequence[Column]) -> list[str]:
     """Return the headings over several columns, and the rules below them."""
     spans = [(group, len(list(own))) for group, own in groupby(shown, key=lambda c: c.group)]
     ends = [sum(n for _, n in spans[:i]) for i in range(len(spans) + 1)]
-    heads = [rf"\multicolumn{{{n}}}{{c}}{{{heading_text(group)}}}" for group, n in spans]
+    heads = [rf"\multicolumn{{{n}}}{{c}}{{{' '.join(map(symbol, group.split()))}}}" for group, n in spans]
     rules = [
         rf"\cmidrule(lr){{{a + 1}-{b}}}" for (a, b), (group, _) in zip(pairwise(ends), spans, strict=True) if group
     ]
@@ -226,10 +226,6 @@ def stacked(header: str) -> str:
     """Return a heading with each of its words on a line, so that it is no wider than its numbers."""
     words = r"\\".join(map(symbol, header.split()))
     return rf"{{\shortstack{{{words}}}}}"
-
-
-def heading_text(text: str) -> str:
-    return " ".join(symbol(word) for word in text.split())
 
 
 def symbol(name: str) -> str:

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pandas import DataFrame
 
 from armid.report.document import Column, Figure, Part, Table
@@ -48,23 +47,12 @@ def fitness_quality(runs: DataFrame) -> Table:
     """Return, per setting, fitness and identifier: errors, the similarity reached, and how the two go together."""
     rows = []
     for key, group in runs.groupby(["setting", "fitness", "identifier"], sort=False):
-        misfit = 1.0 - group["train_s"].to_numpy(float)
-        errors = group["largest_error"].to_numpy(float)
-        known = misfit[~np.isnan(misfit)]
-        middle = np.median(errors), np.max(errors), np.median(known) if known.size else np.nan
-        rows.append((*key, len(group), *middle, rank_correlation(misfit, errors)))
+        misfit, errors = 1.0 - group["train_s"], group["largest_error"]
+        both = DataFrame({"misfit": misfit, "error": errors.replace(np.inf, np.nan)})
+        correlation = both.corr("spearman", min_periods=3).loc["misfit", "error"]
+        rows.append((*key, len(group), errors.median(), errors.max(), misfit.median(), correlation))
     return Table("fitness", "Fitness against error", TABLE_CAPTION, DataFrame(rows, columns=[c.key for c in COLUMNS]),
                  COLUMNS)  # fmt: skip
-
-
-def rank_correlation(first: NDArray[np.float64], second: NDArray[np.float64]) -> float:
-    from scipy.stats import spearmanr
-
-    both = np.isfinite(first) & np.isfinite(second)
-    x, y = first[both], second[both]
-    if x.size < 3 or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
-        return np.nan
-    return float(spearmanr(x, y).statistic)
 
 
 def fitness_quality_figure(runs: DataFrame, colours: Mapping[str, int]) -> Any:

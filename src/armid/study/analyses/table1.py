@@ -137,6 +137,8 @@ def table1_rows(estimates: DataFrame, published: DataFrame) -> DataFrame:
 
 
 def one_row(group: DataFrame) -> dict[str, object]:
+    from scipy.stats import percentileofscore
+
     errors = group["relative_error"].to_numpy(float)
     truth, published, published_error = group[["truth", "published", "published_error"]].to_numpy(float)[0]
     middle = float(group["value"].median())
@@ -146,15 +148,9 @@ def one_row(group: DataFrame) -> dict[str, object]:
         "unit": unit, "n": len(group), "truth": factor * truth, "published": factor * published,
         "median": factor * middle, "published_error": published_error,
         "error_of_median": abs(middle - truth) / abs(truth), "median_error": float(np.median(errors)), "low": low,
-        "high": high, "mean_error": float(np.mean(errors)), "percentile": percentile_among(errors, published_error),
+        "high": high, "mean_error": float(np.mean(errors)),
+        "percentile": percentileofscore(errors, published_error, kind="mean"),
     }  # fmt: skip
-
-
-def percentile_among(errors: ArrayLike, published: float) -> float:
-    """Return the percentage of errors below a published one, equal ones by half."""
-    from scipy.stats import percentileofscore
-
-    return float(percentileofscore(np.asarray(errors, np.float64), published, kind="mean"))
 
 
 def median_interval(values: ArrayLike) -> tuple[float, float]:
