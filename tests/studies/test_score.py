@@ -1,11 +1,11 @@
 """The scorer: one word for each report, and the targets."""
 
-import copy
 import json
 from pathlib import Path
 from typing import Any
 
 import pytest
+from made_up import entry, report
 
 from stand import RefusalError
 from stand.blind.campaign import key_path
@@ -13,41 +13,6 @@ from stand.score.judge import judge, judge_all, read_json
 from stand.score.targets import Target, targets_of
 
 ROOT = Path(__file__).parents[2]
-FLOOR = 0.005
-TRUE = {"p0": 3e6, "k": 1.0, "eta3": 0.6, "n": 1.2}
-
-
-def entry(label: str, *names: str, listed: bool = True, matching: bool = True, matters: bool = True) -> dict[str, Any]:
-    told = {"port": "torque", "form": "f", "matching": matching, "listed": listed, "strength": 1, "sizes": {}}
-    return {
-        "class": label,
-        "parameters": TRUE,
-        "effects": [{"name": name, **told} for name in names],
-        "noise": {"kind": "white"},
-        "floor": {"train": FLOOR, "holdout": None if label == "one_stroke" else FLOOR},
-        "declared_fit": {"holdout_ratio": 3.0, "matters": matters} if names else None,
-    }
-
-
-def report(
-    verdict: str, *steps: tuple[str, tuple[str, ...], bool], after: float = FLOOR, bias: float = 0.0
-) -> dict[str, Any]:
-    """Return a report: steps as (effect, alternatives, claimed); a group is as probable as a claim."""
-    probable = {n: 0.99 / (1 + len(others)) for name, others, claimed in steps for n in (name, *others)
-                if claimed or others}  # fmt: skip
-    held = {"train": {"rmse": 0.0}, "holdout": {"rmse": 0.02}}
-    found = {name: {"value": value * (1.0 + bias), "trusted": bias == 0.0} for name, value in TRUE.items()}
-    return {
-        "verdict": verdict,
-        "also": [],
-        "effects": [name for name, *_ in steps],
-        "steps": [{"effect": name, "alternatives": list(others), "claimed": sure} for name, others, sure in steps],
-        "probabilities": {"effects": probable},
-        "error": {"before": held, "after": {"train": {"rmse": 0.0}, "holdout": {"rmse": after}}},
-        "parameters": {"before": copy.deepcopy(found), "after": found},
-    }
-
-
 COULOMB = ("coulomb", (), True)
 PAIR = ("coulomb", ("seal_friction",), False)
 TILT = ("tilt", (), True)
