@@ -3,7 +3,7 @@
 import fnmatch
 import hashlib
 import json
-from collections import Counter, OrderedDict
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -358,7 +358,7 @@ class RunCache:
 
     def __init__(self, registry: StudyRegistry, folder: Path) -> None:
         self.registry, self.folder = registry, folder
-        self._kept: OrderedDict[str, Any] = OrderedDict()
+        self._kept: dict[str, Any] = {}
 
     def replays(self, settings: Mapping[str, Any]) -> tuple[PreparedCase, tuple[Replay, ...]]:
         """Return the case of a run, and its records with the run's own noise, ready to be simulated."""
@@ -410,11 +410,10 @@ class RunCache:
 
     def _once(self, what: str, of: Mapping[str, Any], make: Callable[[], Any]) -> Any:
         key = what + json.dumps(of, sort_keys=True)
-        if key not in self._kept:
-            self._kept[key] = make()
-            if len(self._kept) > MOST_KEPT:
-                self._kept.popitem(last=False)
-        self._kept.move_to_end(key)
+        # what was asked for last stands last
+        self._kept[key] = self._kept.pop(key) if key in self._kept else make()
+        if len(self._kept) > MOST_KEPT:
+            del self._kept[next(iter(self._kept))]
         return self._kept[key]
 
 

@@ -122,6 +122,8 @@ def run(
     file: the study's, as the command named it. progress: called with the counts at the start once, then with each
     finished run. command: the line that runs it, for its report. Ctrl-C ends it without an error.
     """
+    from joblib import cpu_count
+
     began = time.monotonic()
     chosen = _patterns(only, study)
     if jobs is not None and jobs < 1:
@@ -153,7 +155,8 @@ def run(
                 # a study that is complete needs no room
                 refuse_unwritable(folder, FILE_NAME)
             if counts.missing:
-                pool = _pool(jobs, dask, setup, counts.missing)
+                width = min(jobs or cpu_count(), counts.missing)
+                pool = LocalPool(width, setup) if dask is None else DaskPool(dask, setup)
                 try:
                     for outcome in _performed(store, pool, interrupted):
                         finished, simulations = finished + 1, simulations + outcome.used
@@ -184,14 +187,6 @@ def _performed(store: Store, pool: "LocalPool | DaskPool", interrupted: Callable
                 raise ArmidError(f"a worker has gone ({words[:200]}): start again to go on") from error
             if store.save(outcome):
                 yield outcome
-
-
-def _pool(jobs: int | None, dask: str | None, setup: WorkerSetup, n_runs: int) -> "LocalPool | DaskPool":
-    if dask is not None:
-        return DaskPool(dask, setup)
-    from joblib import cpu_count
-
-    return LocalPool(min(jobs or cpu_count(), n_runs), setup)
 
 
 def _patterns(only: str, study: Task) -> tuple[str, str]:

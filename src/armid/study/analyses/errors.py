@@ -112,7 +112,8 @@ def valley_figure(ends: DataFrame, colours: Mapping[str, int]) -> Any:
     pyplot()
     names = [c for c in ends.columns if c not in ("variant", "setting")]
     chosen = [v for v in sorted(colours, key=lambda v: colours[v]) if colours[v] < MOST_COLOURED]
-    shown = thinned(ends.assign(shown=ends["variant"].where(ends["variant"].isin(chosen), OTHERS)))
+    marked = ends.assign(shown=ends["variant"].where(ends["variant"].isin(chosen), OTHERS))
+    shown = concat([every_nth(own, MOST_ERRORS_DRAWN) for _, own in marked.groupby("variant", sort=False)])
     hues = [v for v in (OTHERS, *chosen) if v in set(shown["shown"])]
     palette = {v: PALE if v == OTHERS else COLOURS[colours[v]] for v in hues}
     marks = ["." if v == OTHERS else MARKERS[colours[v]] for v in hues]
@@ -123,18 +124,15 @@ def valley_figure(ends: DataFrame, colours: Mapping[str, int]) -> Any:
         grid.map_diag(histogram)
         linear = linear_range(shown[names].to_numpy(float))
         ticks = signed_powers(linear, float(np.abs(shown[names].to_numpy(float)).max()))
-        labels = [f"{tick:g}" for tick in ticks]
-        for axis in (a for a in grid.axes.flat if a is not None):
-            axis.set_xscale("symlog", linthresh=linear)
-            axis.set_xticks(ticks, labels)
-            axis.minorticks_off()
-            axis.grid(alpha=0.3)
-            axis.tick_params(labelsize=8)
-        for axis in (grid.axes[i, j] for i in range(len(names)) for j in range(i)):
-            axis.set_yscale("symlog", linthresh=linear)
-            axis.set_yticks(ticks, labels)
-            axis.minorticks_off()
         for i, name in enumerate(names):
+            for j, axis in enumerate(grid.axes[i, : i + 1]):
+                # a histogram counts upwards
+                for side in "xy"[: 1 + (j < i)]:
+                    getattr(axis, f"set_{side}scale")("symlog", linthresh=linear)
+                    getattr(axis, f"set_{side}ticks")(ticks, [f"{tick:g}" for tick in ticks])
+                axis.minorticks_off()
+                axis.grid(alpha=0.3)
+                axis.tick_params(labelsize=8)
             grid.axes[i, 0].set_ylabel(f"{name} [%]" if i else "runs")
             grid.axes[-1, i].set_xlabel(f"{name} [%]")
         grid.add_legend(title="", loc="upper right", bbox_to_anchor=(0.99, 0.98), fontsize=10, markerscale=1.2)
@@ -165,7 +163,3 @@ def scatter(x: np.ndarray, y: np.ndarray, **look: Any) -> None:
     pyplot().gca().plot(
         x, y, ls="", marker=look["marker"], ms=5, mfc="none", mec=look["color"], mew=0.9, label=look.get("label")
     )
-
-
-def thinned(ends: DataFrame) -> DataFrame:
-    return concat([every_nth(own, MOST_ERRORS_DRAWN) for _, own in ends.groupby("variant", sort=False)])

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from pandas import DataFrame, Series, factorize
+from pandas import DataFrame, Series, concat, factorize
 
 from armid.report.document import Column, Table
 from armid.study.analyses.analysis import N_RUNS, PAPER, PARAMETER, SETTING, VARIANT, Analysis, Evidence
@@ -59,20 +59,23 @@ RUNS_ANALYSIS = Analysis("runs", "Runs", lambda evidence: (
 
 def overview(runs: DataFrame, estimates: DataFrame, published: DataFrame) -> Table:
     """Return mean and median relative error of each parameter, and the tail of the largest, one line a variant."""
-    names = list(dict.fromkeys(estimates["parameter"]))
-    rows = [paper_row(published, names)] if len(published) else []
-    by = ["setting", "variant"]
-    of_each = estimates.groupby([*by, "parameter"], sort=False)["relative_error"].agg(["mean", "median"])
-    for key, group in runs.groupby(by, sort=False):
-        failed = int((group["status"] != "done").sum())
-        row: dict[str, object] = {**dict(zip(by, key, strict=True)), "n": len(group), "n_failed_runs": failed}
-        row |= {"used": group["used"].median()} | tail(group["largest_error"].to_numpy())
-        for name in names:
-            both = of_each.loc[(*key, name)] if (*key, name) in of_each.index else {"mean": np.nan, "median": np.nan}
-            row |= {f"{name}_mean": both["mean"], f"{name}_median": both["median"]}
-        rows.append(row)
+    names, by = list(dict.fromkeys(estimates["parameter"])), ["setting", "variant"]
+    if len(published):
+        # the paper's rows are runs of one identifier more
+        paper = published.assign(setting="", variant=PAPER)
+        largest = paper.groupby(["case", *by], sort=False)["relative_error"].max().rename("largest_error").reset_index()
+        runs = concat([largest.assign(status="done", used=np.nan), runs])
+        estimates = concat([paper, estimates])
+    of_each = estimates.groupby([*by, "parameter"], sort=False)["relative_error"].agg(["mean", "median"]).unstack()
+    frame = runs.groupby(by, sort=False).agg(
+        n=("status", "size"), n_failed_runs=("status", lambda s: int((s != "done").sum())), used=("used", "median"),
+        largest_median=("largest_error", lambda e: e.median(skipna=False)),
+        largest_p95=("largest_error", lambda e: np.quantile(e, 0.95, method="inverted_cdf")),
+        largest_worst=("largest_error", lambda e: e.max(skipna=False)),
+    )  # fmt: skip
+    frame = frame.assign(**{f"{name}_{kind}": of_each[kind, name] for name in names for kind in ("mean", "median")})
     # rows of a setting stand together, settings in the order of their first row
-    frame = DataFrame(rows).sort_values("setting", key=lambda s: Series(factorize(s)[0], s.index), kind="stable")
+    frame = frame.reset_index().sort_values("setting", key=lambda s: Series(factorize(s)[0], s.index), kind="stable")
     columns = [Column("used", "simulations", ",.0f")]
     columns += [Column(f"largest_{key}", f"largest {text}", ".3g", 100.0)
                 for key, text in (("median", "median"), ("worst", "worst"), ("p95", "95 %"))]  # fmt: skip
@@ -81,21 +84,6 @@ def overview(runs: DataFrame, estimates: DataFrame, published: DataFrame) -> Tab
     caption = OVERVIEW_CAPTION + (PAPER_CAPTION if len(published) else "")
     return Table("overview", "Relative errors of all identifiers [%]", caption, frame,
                  (SETTING, VARIANT, *columns), grouped=True)  # fmt: skip
-
-
-def tail(errors: np.ndarray) -> dict[str, float]:
-    p95 = np.quantile(errors, 0.95, method="inverted_cdf")
-    return {"largest_median": float(np.median(errors)), "largest_p95": float(p95), "largest_worst": float(errors.max())}
-
-
-def paper_row(published: DataFrame, names: list[str]) -> dict[str, object]:
-    errors = published.pivot(index="case", columns="parameter", values="relative_error")
-    row: dict[str, object] = {"setting": "", "variant": PAPER, "n": len(errors), "n_failed_runs": 0, "used": np.nan}
-    row |= tail(errors.max(axis=1).to_numpy())
-    for name in names:
-        if name in errors:
-            row |= {f"{name}_mean": errors[name].mean(), f"{name}_median": errors[name].median()}
-    return row
 
 
 def values(runs: DataFrame, estimates: DataFrame, unit: str) -> Table:
