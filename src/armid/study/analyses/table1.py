@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pandas import DataFrame
+from pandas import DataFrame, concat
 
 from armid.report.document import Column, Figure, Part, Table, Text, slug, unlike
 from armid.report.style import DASHES, INK, legend_below, line_look, panels, row_names
@@ -39,7 +39,7 @@ LAYOUT_CAPTION = (
     "ours to a simulated one: medians over the seeds. 0.000 is an error below 0.0005 %."
 )
 DEVIATION_CAPTION = " deviation: standard deviation of the population."
-PRINTED_PARTS = ("truth", "value", "relative_error")
+PRINTED_PARTS = {"truth": "true", "value": "found", "relative_error": "error"}
 # Smaller errors are drawn there [%].
 DRAWN_FROM = 1e-9
 RESAMPLES = 2000
@@ -90,27 +90,24 @@ def paper_layout(evidence: Evidence, title: str, with_truth: bool) -> Table:
             blocks.append((f"{variant}, {setting}", medians.assign(relative_error=error)))
     units = dict(zip(evidence.estimates["parameter"], evidence.estimates["unit"], strict=True))
     names = [n for n in dict.fromkeys(published["parameter"]) if n in units]
-    rows, columns = [], [Column("source", "source"), Column("case", "row")]
+    tables, columns = [], [Column("source", "source"), Column("case", "row")]
     for name in names:
         factor, unit = shown(1.0, units[name])
         group = name if unit == "1" else f"{name} [{unit}]"
         columns += [Column(f"{name}_true", f"{group} true", ".2f" if with_truth else ".4f", factor, group),
                     Column(f"{name}_found", f"{group} found", ".4f", factor, group),
                     Column(f"{name}_error", f"{group} error %", ".3f", 100.0, group)]  # fmt: skip
+    keys = [c.key for c in columns[2:]]
     for source, block in blocks:
-        of = {name: block[block["parameter"] == name] for name in names}
-        for case in dict.fromkeys(block["case"]):
-            at = [rows_of[rows_of["case"] == case] for rows_of in of.values()]
-            rows.append(
-                (source, case, *(float(a[key].iloc[0]) if len(a) else np.nan for a in at for key in PRINTED_PARTS))
-            )
-        values = [[rows_of[key].mean() for key in PRINTED_PARTS[1:]] for rows_of in of.values()]
-        means = [(np.nan, np.nan if with_truth else mean, error) for mean, error in values]
-        rows.append((source, "mean", *(x for group in means for x in group)))
+        wide = block.pivot(index="case", columns="parameter", values=[*PRINTED_PARTS])
+        wide = wide.set_axis([f"{name}_{PRINTED_PARTS[part]}" for part, name in wide.columns], axis=1)
+        wide = wide.reindex(index=list(dict.fromkeys(block["case"])), columns=keys)
+        mean, scatter = wide.mean(), wide.std(ddof=0)
+        wide.loc["mean"] = mean.where([k.endswith("_error" if with_truth else ("_found", "_error")) for k in keys])
         if not with_truth:
-            scatter = [rows_of["value"].std(ddof=0) for rows_of in of.values()]
-            rows.append((source, "deviation", *(x for s in scatter for x in (np.nan, s, np.nan))))
-    frame = DataFrame(rows, columns=[c.key for c in columns])
+            wide.loc["deviation"] = scatter.where([k.endswith("_found") for k in keys])
+        tables.append(wide.rename_axis("case").reset_index().assign(source=source))
+    frame = concat(tables)[["source", "case", *keys]]
     name = slug(title, "as printed")
     caption = LAYOUT_CAPTION + ("" if with_truth else DEVIATION_CAPTION)
     return Table(name, f"{title} as the paper prints it, and ours", caption, frame, tuple(columns), grouped=True)
