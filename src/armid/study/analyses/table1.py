@@ -100,12 +100,12 @@ def paper_layout(evidence: Evidence, title: str, with_truth: bool) -> Table:
     keys = [c.key for c in columns[2:]]
     for source, block in blocks:
         wide = block.pivot(index="case", columns="parameter", values=[*PRINTED_PARTS])
-        wide = wide.set_axis([f"{name}_{PRINTED_PARTS[part]}" for part, name in wide.columns], axis=1)
+        wide = wide.set_axis(wide.columns.map(lambda at: f"{at[1]}_{PRINTED_PARTS[at[0]]}"), axis=1)
         wide = wide.reindex(index=list(dict.fromkeys(block["case"])), columns=keys)
         mean, scatter = wide.mean(), wide.std(ddof=0)
-        wide.loc["mean"] = mean.where([k.endswith("_error" if with_truth else ("_found", "_error")) for k in keys])
+        wide.loc["mean"] = mean[mean.index.str.endswith("_error" if with_truth else ("_found", "_error"))]
         if not with_truth:
-            wide.loc["deviation"] = scatter.where([k.endswith("_found") for k in keys])
+            wide.loc["deviation"] = scatter[scatter.index.str.endswith("_found")]
         tables.append(wide.rename_axis("case").reset_index().assign(source=source))
     frame = concat(tables)[["source", "case", *keys]]
     name = slug(title, "as printed")
