@@ -1,9 +1,5 @@
-"""The paper's swarm: its equations, what pymoo expects of it, and pyswarms as an independent second opinion."""
+"""The paper's swarm: its equations, particle by particle, and what pymoo expects of it."""
 
-import json
-import subprocess
-import sys
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +8,6 @@ from numpy.typing import NDArray
 from pymoo.core.evaluator import Evaluator
 from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
-from scipy.stats import ks_2samp
 
 from armid.identifiers import IDENTIFIERS, as_identifier
 from armid.identifiers.pso import PaperPSO
@@ -112,41 +107,6 @@ def test_values_of_the_problem_beside_the_fitness_reach_the_individuals() -> Non
 def test_refuses_problems_it_cannot_search(problem: Problem, sentence: str) -> None:
     with pytest.raises(ValueError, match=sentence):
         minimize(problem, PaperPSO(), seed=1)
-
-
-PYSWARMS = """
-import json, logging
-import numpy as np
-from pyswarms.single.global_best import GlobalBestPSO
-logging.disable(logging.CRITICAL)
-
-def valley(x):
-    a, b, c, d = x.T
-    return sum(100.0 * (v - u * u) ** 2 + (1.0 - u) ** 2 for u, v in ((a, b), (b, c), (c, d)))
-
-low, high, errors = np.full(4, -2.0), np.full(4, 2.0), []
-for seed in range(40):
-    np.random.seed(seed)
-    swarm = GlobalBestPSO(80, 4, {"c1": 1.2, "c2": 1.7, "w": 0.9}, (low, high), {"w": "lin_variation"}, "nearest",
-                          (low, high))
-    swarm.swarm.velocity = 0.2 * 4.0 * (2.0 * np.random.random((80, 4)) - 1.0)
-    schedule = swarm.oh
-    swarm.oh = lambda options, iternow, itermax: schedule(options, iternow=iternow + 1, itermax=itermax)
-    errors.append(float(swarm.optimize(valley, 150, verbose=False)[0]))
-print(json.dumps(errors))
-"""
-
-
-@pytest.mark.slow
-def test_pyswarms_finds_as_much(tmp_path: Path) -> None:
-    # in a process and a folder of its own: pyswarms draws from the global generator, reconfigures logging, writes a log
-    # file; its first iteration counts as 0 and its first velocities fill the limit, so both are matched to ours there
-    theirs = subprocess.run([sys.executable, "-c", PYSWARMS], cwd=tmp_path, capture_output=True, text=True, check=True)
-    ours = [minimize(Valley(), PaperPSO(), seed=seed).F[0] for seed in range(40)]
-    a, b = np.log10(ours), np.log10(json.loads(theirs.stdout))
-    assert len(b) == 40
-    assert ks_2samp(a, b).pvalue > 0.01
-    assert abs(np.median(a) - np.median(b)) < 0.5
 
 
 def test_the_catalogue_stretches_the_schedule_over_the_budget() -> None:

@@ -80,16 +80,15 @@ def fitted(columns: Sequence[Column], rows: Sequence[Sequence[Cell]], room: int)
 
 
 def folded_to(columns: Sequence[Column], rows: Sequence[Sequence[Cell]], room: int, least_numbers: int) -> list[int]:
-    texts = [[cell.text for cell in cells] for _, *cells in zip(columns, *rows, strict=True)]
-    heads = [words(column.header).splitlines() or [""] for column in columns]
-    cells = [max((len(line) for text in own for line in text.splitlines()), default=0) for own in texts]
-    whole = [max(width, len(column.header)) for width, column in zip(cells, columns, strict=True)]
-    least = []
-    for column, head, own, width in zip(columns, heads, texts, cells, strict=True):
-        longest = max(len(word) for word in head)
-        parts = max((len(word) for text in own for word in text.split()), default=0)
-        folded = least_numbers if any(c.isdigit() for text in own for c in text) else LEAST_WORDS
-        least.append(max(longest, width if column.digits else min(width, max(folded, parts))))
+    whole, least = [], []
+    for column, *cells in zip(columns, *rows, strict=True):
+        texts = [cell.text for cell in cells]
+        width = max((len(line) for text in texts for line in text.splitlines()), default=0)
+        word = max((len(word) for text in texts for word in text.split()), default=0)
+        head = max(map(len, column.header.split()), default=0)
+        folded = least_numbers if any(map(str.isdigit, "".join(texts))) else LEAST_WORDS
+        whole.append(max(width, len(column.header)))
+        least.append(max(head, width if column.digits else min(width, max(folded, word))))
     least[0] = min(whole[0], max(least[0], NAME_WIDTH))
     n = max((k for k in range(1, len(columns) + 1) if FRAME + sum(least[:k]) + BETWEEN_COLUMNS * k <= room), default=1)
     widths = least[:n]
@@ -101,11 +100,6 @@ def folded_to(columns: Sequence[Column], rows: Sequence[Sequence[Cell]], room: i
     return widths
 
 
-def words(header: str) -> str:
-    """Return a heading with each of its words on a line of its own, so that it is no wider than its numbers."""
-    return header.replace(" ", "\n")
-
-
 def drawn(
     columns: Sequence[Column], rows: Sequence[Sequence[Cell]], widths: Sequence[int], headed: bool
 ) -> "RichTable":
@@ -115,7 +109,7 @@ def drawn(
     made = RichTable(show_header=headed)
     for column, width in zip(columns, widths, strict=False):
         # as Text: a name is not markup
-        shown = RichText(column.header if len(column.header) <= width else words(column.header))
+        shown = RichText(column.header if len(column.header) <= width else column.header.replace(" ", "\n"))
         made.add_column(shown, width=width, overflow="fold", justify="right" if column.digits else "left")
     for row in rows:
         made.add_row(*(RichText(cell.text, style="strike" if cell.is_struck else "")

@@ -20,7 +20,7 @@ from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from pathlib import Path
 from queue import SimpleQueue
-from threading import Event, Lock, Timer
+from threading import Lock
 from typing import Any
 
 from armid.errors import ArmidError
@@ -110,31 +110,21 @@ class Worker:
         raise ArmidError(f"a worker process cannot start: it {cause}")
 
     def _answer(self, message: Any, seconds: float) -> tuple[str, Any]:
-        """Return word and content of the worker's answer to a message; after so many seconds it is killed."""
+        """Return word and content of the worker's answer to a message, LATE after so many seconds without one."""
         assert self._process is not None
         assert self._connection is not None
-        process, late = self._process, Event()
-
-        def end() -> None:
-            late.set()
-            process.kill()
-
-        limit = Timer(seconds, end)
-        limit.daemon = True
-        limit.start()
         try:
             self._connection.send(message)
+            if not self._connection.poll(seconds):
+                return LATE, ""
             word, content = self._connection.recv()
             return word, content
         except (EOFError, OSError):
-            code = process.wait()
-            by = f"with code {code}" if code >= 0 else f"by {signal.Signals(-code).name}"
-            return (LATE, "") if late.is_set() else (DIED, f"ended {by}")
+            code = self._process.wait()
+            return DIED, f"ended with code {code}" if code >= 0 else f"ended by {signal.Signals(-code).name}"
         except Exception:
             # the bytes are not a pickle, or the object is not a word and its content
             return DIED, NO_MESSAGE
-        finally:
-            limit.cancel()
 
     def _end(self) -> None:
         assert self._process is not None

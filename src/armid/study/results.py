@@ -47,7 +47,7 @@ FROM plan p JOIN runs r USING (run) JOIN loops l USING (run) ORDER BY p.place
 TRACES = "SELECT t.run, t.names, t.trace FROM plan p JOIN traces t USING (run)"
 NUMERIC_COLUMNS = ("noise_deg_s", "value", "train_rmse", "train_s", "train_s1", "train_s2", "holdout_rmse", "seconds")
 COUNTED = ("used", "n_failed")
-EMPTY = RunTrace("", np.empty(0, np.int64), np.empty(0), np.empty((0, 0)), ())
+NO_TRACE = RunTrace("", np.empty(0, np.int64), np.empty(0), np.empty((0, 0)), ())
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -101,7 +101,7 @@ class StudyResults(Shown):
     @property
     def traces(self) -> pd.DataFrame:
         """One row an improvement: run, evaluation, value, and x_NAME for each parameter of the study."""
-        return pd.concat([*map(self._frame, self.iter_traces())] or [self._frame(EMPTY)], ignore_index=True)
+        return pd.concat([*map(self._frame, self.iter_traces())] or [self._frame(NO_TRACE)], ignore_index=True)
 
     def trace_of(self, run: str) -> pd.DataFrame:
         """Return the improvements of one run; ArmidError for one that is not there or has failed."""
