@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from difflib import get_close_matches
 from functools import partial
 from inspect import signature
 from itertools import accumulate
@@ -149,9 +150,13 @@ def of_phases(
         if dot and name in named:
             named[name][option] = value
         elif key not in own:
-            near = f"{nearest(key, own)}; " if own else ""
-            raise ArmidError(f"{whose} has no option '{key}', {near}those of a phase carry its name, "
-                             f"{', '.join(f'{name}.OPTION' for name in named)}")  # fmt: skip
+            known = [
+                *own,
+                *(f"{n}.{each}" for n, phase in zip(names, phases, strict=True) for each in options_of(phase)),
+            ]
+            hint = [f"did you mean '{near}'?" for near in get_close_matches(key, known, n=1)]
+            hint += [f"those of a phase carry its name, {', '.join(f'{name}.OPTION' for name in named)}"]
+            raise ArmidError(f"{whose} has no option '{key}', {hint[0]}")
     return tuple(
         # a multistart passes options on by name
         phase.with_options(named[n] if phase.name == n else {f"{n}.{option}": v for option, v in named[n].items()})
