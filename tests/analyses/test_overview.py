@@ -15,7 +15,7 @@ from armid.study.analyses.errors import (
 )
 from armid.study.analyses.fitness_quality import fitness_quality, fitness_quality_figure
 from armid.study.analyses.overview import loop_runs, main_table, reasons, runs_table
-from armid.study.analyses.success import success, success_rates
+from armid.study.analyses.success import success
 from armid.study.document import report_of, summary_of
 from armid.units import angles_in
 
@@ -73,14 +73,13 @@ def outcomes_with(errors):
 
 
 def test_at_the_tolerance_is_within_a_failed_run_is_no_success_and_an_unknown_truth_no_evidence():
-    rates = success_rates(outcomes_with([1e-2, 0.0099, 0.02, np.inf, np.nan]), [1e-2, 1e-3])
-    assert rates["successes"].tolist() == [2, 0]
-    assert rates["n"].tolist() == [4, 4]
-    assert rates["rate"].tolist() == [0.5, 0.0]
+    row = success(outcomes_with([1e-2, 0.0099, 0.02, np.inf, np.nan])).frame.iloc[0]
+    assert (row["n"], row["within_1_percent_successes"], row["within_0.1_percent_successes"]) == (4, 2, 0)
+    assert (row["within_1_percent_rate"], row["within_0.1_percent_rate"]) == (0.5, 0.0)
 
 
 def test_success_rates_show_their_interval_in_percent():
-    table = success(success_rates(outcomes_with([1e-5] * 8 + [1.0] * 2)))
+    table = success(outcomes_with([1e-5] * 8 + [1.0] * 2))
     # Wilson's interval of 8 of 10
     assert table.frame.loc[0, "within_1_percent_text"] == "80.0 (49.0 to 94.3)"
 

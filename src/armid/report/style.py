@@ -311,10 +311,3 @@ def mark_handle(label: str, marker: str, colour: str) -> Any:
 
 def marker_of(k: int) -> str:
     return MARKERS[k % len(MARKERS)]
-
-
-def draw_intervals(axis: Any, x: Array, y: Array, low: Array, high: Array, k: int, numbers: Iterable[int]) -> None:
-    """Draw marks of one shape, k, with their intervals along x; numbers: of the colour of each mark."""
-    colours = [line_look(i)["color"] for i in numbers]
-    axis.errorbar(x, y, xerr=np.array([x - low, high - x]).clip(min=0.0), fmt="none", ecolor=colours, elinewidth=1.4)
-    axis.scatter(x, y, c=colours, marker=marker_of(k), s=26, zorder=3)

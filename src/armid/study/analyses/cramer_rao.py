@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from pandas import DataFrame
 
 from armid.report.document import Column, Figure, Part, Table
-from armid.report.style import draw_intervals, legend_below, log_axis, mark_handles, panels, row_names
+from armid.report.style import legend_below, line_look, log_axis, mark_handles, marker_of, panels, row_names
 from armid.study.analyses.analysis import N_RUNS, PARAMETER, SETTING, VARIANT, Analysis, Evidence
 
 # A standard deviation within these, in units of the bound, is what an efficient estimate has.
@@ -121,7 +121,9 @@ def cramer_rao_figure(rows: DataFrame, colours: Mapping[str, int]) -> Any:
             aside = 0.7 * ((k + 0.5) / len(cases) - 0.5)
             y = [places[group] + aside for group in zip(own["variant"], own["setting"], strict=True)]
             ratio, low, high = (own[key].to_numpy() for key in ("ratio", "low", "high"))
-            draw_intervals(axis, ratio, np.array(y), low, high, k, own["variant"].map(colours))
+            look = [line_look(i)["color"] for i in own["variant"].map(colours)]
+            axis.errorbar(ratio, y, xerr=[ratio - low, high - ratio], fmt="none", ecolor=look, elinewidth=1.4)
+            axis.scatter(ratio, y, c=look, marker=marker_of(k), s=26, zorder=3)
         row_names(axis, i, [f"{v}\n{s}" for v, s in places])
         axis.set(ylim=(len(places) - 0.5, -0.5), xlabel=f"{name}: standard deviation / bound")
         if rows["high"].max() > LARGEST_LINEAR:
