@@ -28,14 +28,22 @@ from input_texts import TABLE_STUDY
 settings.register_profile("armid", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("armid")
 ROOT = Path(__file__).parents[1]
-# Fast tests, or the loops of others, run the lines of these packages too: their slow ones go without the tracer of
-# coverage, which makes them up to twice as long.
-NOT_TRACED = ("bench", "contract", "engine", "identifiers", "model", "problem")
+# Fast tests, or other loops, run the lines of these folders, files and tests too: their slow ones go without the tracer
+# of coverage, which makes them up to twice as long.
+NOT_TRACED = (
+    "bench", "contract", "engine", "identifiers", "model", "problem", "test_golden_outputs.py",
+    "test_a_mistake_is_named", "test_a_right_campaign_is_not_accused", "test_right_campaigns_are_not_accused",
+    "test_holdout_records_decide_nothing", "test_the_advised_record_tells_apart_and_beats_a_random_one",
+    "test_finds_on_one_stroke_what_the_paper_found", "test_another_form_of_an_effect_takes_its_place",
+    "test_two_effects_are_found_together", "test_a_fault_of_one_record_is_told_beside_an_effect",
+    "test_a_fault_that_held_out_records_deny_is_gone_whole",
+)  # fmt: skip
 # Those that take longest come first, so that two processes end together.
 LONGEST = (
     "test_a_late_voltage_is_no_late_torque", "test_the_small_blind_suite", "test_every_effect_keeps_its_contract",
     "test_a_runner_killed_again_and_again", "test_the_notebook_runs", "test_the_small_table",
-    "test_every_snippet_runs_and_every_output_is_true", "test_random_candidates_agree_with_the_test_stand",
+    "test_every_snippet_runs_and_every_output_is_true", "test_right_campaigns_are_not_accused",
+    "test_closing_the_loop",
 )  # fmt: skip
 Array = NDArray[np.float64]
 AXIS_TOML = """\
@@ -86,7 +94,8 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put the longest tests first, and mark the slow ones that coverage leaves out."""
     items.sort(key=lambda item: item.name.partition("[")[0] not in LONGEST)
     for item in items:
-        if item.get_closest_marker("slow") and item.path.relative_to(ROOT / "tests").parts[0] in NOT_TRACED:
+        places = {item.path.relative_to(ROOT / "tests").parts[0], item.name.partition("[")[0]}
+        if item.get_closest_marker("slow") and places & set(NOT_TRACED):
             item.add_marker("no_cover")
 
 

@@ -9,44 +9,22 @@ from armid import Constant, Input, Parameter, Plant, Scales, State
 OHMS, K_T, DRUM, FRICTION, INTERVAL = 1.4, 0.21, 3.2e-3, 2.5e-3, 0.004
 
 
-def motor_torque(volts, winding, k_t, w, ohms):
-    """Torque of the motor [N m]."""
-    return k_t * (volts + winding - k_t * w) / ohms
-
-
-def recorded_speed(w, output):
-    """Speed of the drum as recorded [rad/s]."""
-    return w + output
-
-
-def acceleration(motor_torque, torque, drum):
-    """Acceleration of the drum [rad/s2]."""
-    return (motor_torque + torque) / drum
-
-
-def first_speed(start_speed):
-    """Speed at the first sample [rad/s]."""
-    return start_speed
-
-
 winch = Plant(
     name="winch",
     parameters=(Parameter("drum", "kg m2", 5e-4, 2e-2, nominal=3e-3, note="inertia of drum and rotor"),),
-    states=(State("w", "rad/s", acceleration, first_speed, "shaft_speed_rad_s"),),
-    quantities={"motor_torque": motor_torque, "recorded_speed": recorded_speed},
+    states=(State("w", "rad/s", lambda motor_torque, torque, drum: (motor_torque + torque) / drum,
+                  lambda start_speed: start_speed, "shaft_speed_rad_s"),),
+    quantities={"motor_torque": lambda volts, winding, k_t, w, ohms: k_t * (volts + winding - k_t * w) / ohms,
+                "recorded_speed": lambda w, output: w + output},
     constants=(
         Constant("ohms", OHMS, "ohm", "data sheet", tolerance=0.0),
         Constant("k_t", K_T, "N m/A", "data sheet", tolerance=0.0),
         Constant("start_speed", 0.0, "rad/s", "set from the record"),
     ),
     inputs=(Input("volts", "V", ("volts_V",), hold="zero", typical=(-24.0, 24.0)),),
-    ports={"torque": "N m", "winding": "V", "output": "rad/s"},
-    aliases={"omega": "w"},
-    output="recorded_speed",
-    output_unit="rad/s",
-    scales=Scales(effort=3.0, speed=80.0),
-    from_rest=False,
-)
+    ports={"torque": "N m", "winding": "V", "output": "rad/s"}, aliases={"omega": "w"}, output="recorded_speed",
+    output_unit="rad/s", scales=Scales(effort=3.0, speed=80.0), from_rest=False,
+)  # fmt: skip
 
 
 def held_voltage(rng, n_levels=24):

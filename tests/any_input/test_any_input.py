@@ -1,7 +1,10 @@
-"""Whatever files and options hold, reading ends in a campaign, values or an ArmidError, never in another exception."""
+"""Whatever files and options hold, reading ends in a campaign, a study, values or an ArmidError, never otherwise."""
 
+import shutil
+import tempfile
 import tomllib
 import warnings
+from pathlib import Path
 
 import numpy as np
 from hypothesis import example, given
@@ -28,6 +31,7 @@ from armid.identifiers import IDENTIFIERS, identifier_of
 from armid.model import PLANTS, Model
 from armid.problem.meter import Meter, MeterTermination
 from armid.problem.space import space_of
+from armid.study.tasks import Study, read_study
 
 ARM, AXIS = tomllib.loads(ARM_TOML), tomllib.loads(AXIS_TOML)
 
@@ -49,14 +53,6 @@ def test_any_value_for_the_arm_and_for_an_axis(case):
 @given(st.sampled_from([(ARM_TOML, ARM_CSV), (AXIS_TOML, AXIS_CSV)]), edits, edits)
 def test_edited_text_of_the_arm_and_of_an_axis(texts, toml, csv):
     read_whatever(edited(texts[0], toml), edited(texts[1], csv))
-
-
-@many(120)
-@given(st.lists(st.tuples(st.floats(), st.floats(), st.floats(), st.floats()), min_size=15, max_size=40), st.booleans())
-def test_any_numbers(rows, sort):
-    ordered = sorted(rows) if sort else rows
-    text = "time_s,angular_velocity_rad_s,drive_V,angle_deg\n" + "".join(",".join(map(repr, r)) + "\n" for r in ordered)
-    read_whatever(AXIS_TOML.replace("restart_s = 0.03", "").encode(), text.encode())
 
 
 @many(120)
@@ -150,3 +146,42 @@ def test_any_bounds_and_fixed_values(bounds, fixed):
 @given(st.one_of(st.text(max_size=10), st.tuples(TEXTS, TEXTS).map(":".join)))
 def test_any_window(text):
     outcome(lambda: interval(text, "--window"))
+
+
+FROZEN = Path(__file__).parents[1] / "frozen"
+STUDY = (FROZEN / "study.toml").read_text(encoding="utf-8")
+TABLE = tomllib.loads(STUDY)
+
+
+def study_of(content: bytes) -> bool:
+    """Read a study of these bytes beside campaigns; tell whether it was one."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        shutil.copytree(FROZEN / "campaigns", folder / "campaigns")
+        (folder / "study.toml").write_bytes(content)
+        return outcome(lambda: checked(folder / "study.toml")) is not None
+
+
+def checked(file: Path) -> Study:
+    study = read_study(file)
+    assert study.description()["name"] == study.name
+    assert next(iter(study.plan())).run
+    return study
+
+
+def test_the_original_is_a_study():
+    assert study_of(STUDY.encode())
+    assert study_of(toml_of(TABLE))
+
+
+@many(80)
+@given(mutated(TABLE))
+def test_any_value(table):
+    study_of(toml_of(table))
+
+
+@many(40)
+@given(st.binary(max_size=200))
+@example(b"\xef\xbb\xbf")
+def test_any_bytes_for_a_study(content):
+    study_of(content)

@@ -29,44 +29,6 @@ def plain(omega, level):
     return -level * omega
 
 
-def with_helper(omega, level):
-    return -level * smooth_sign(omega)
-
-
-def with_helper_by_name(omega, level):
-    """A helper called with named arguments, in another order."""
-    return -level * smooth_sign(width=0.1, x=omega)
-
-
-def helper_named_as_port(omega, level):
-    return torque(level * omega)
-
-
-def helper_of_helper(omega, level):
-    return s(torque(level * omega))
-
-
-def constants(omega, level):
-    """Constants of the file, a negative one to a power among them."""
-    return level * (NEGATIVE**EXPONENT * omega + NEGATIVE**5 * WIDTH) / 9.0
-
-
-def constants_of_modules(omega, level):
-    return -level * omega * math.pi / np.pi + math.e * 0.0
-
-
-def imported_by_name(omega, level):
-    return -level * direction_of(omega) * sqrt(abs(omega) + 1.0)
-
-
-def choice(omega, level):
-    return -level if omega > 0.0 else (level if omega < 0.0 else 0.0)
-
-
-def logic(omega, level):
-    return -level * (1.0 if (0.0 < omega <= 0.2 and not level > 100.0) or omega > 1.0 else 0.5)
-
-
 def several_lines(omega, level):
     push: float = level * omega
     push *= 2.0
@@ -74,20 +36,8 @@ def several_lines(omega, level):
     return -push
 
 
-def where_and_clip(omega, level):
-    return -level * np.clip(np.where(np.abs(omega) > 0.1, omega, 0.0), -0.5, 0.5)
-
-
-def three_at_once(omega, level):
-    return -min(level, max(omega, 0.1, -omega), 5.0)
-
-
 def defaults(omega, level, /, share=0.5, offset=-WIDTH):
     return -level * omega * share + offset * level
-
-
-def powers(omega, level):
-    return -level * (omega**2 + omega**3 + abs(omega) ** 1.5 + (1.0 + omega**2) ** -1 + np.abs(omega) ** 0.5)
 
 
 def branches(omega, level):
@@ -97,10 +47,6 @@ def branches(omega, level):
     if omega > 0.1:
         return -0.5 * level
     return 0.0
-
-
-def nested_selections(omega, level):
-    return np.where(omega > 0.3, -level, np.where(omega > 0.1, -0.5 * level, 0.0))
 
 
 def loop(omega, level):
@@ -115,15 +61,6 @@ def repeated(omega, level):
     while x > 0.05:
         x = x - 0.05
     return -level * x
-
-
-def rare(omega, level):
-    return -level * (np.arcsinh(omega) + math.expm1(omega) + omega % 0.1 + np.ceil(omega) + round(omega, 2))
-
-
-def calls_branches(omega, level):
-    """A helper that runs lane by lane makes its caller do so."""
-    return 0.5 * branches(omega, level)
 
 
 def names_of_the_loop(omega, level):
@@ -141,13 +78,30 @@ def made(factor):
     return closure
 
 
-closed_over = made(2.0)
-short = lambda omega, level: -level * omega  # noqa: E731 - equations may be lambdas
-pair = (lambda omega, level: level + omega * 0.0, lambda omega, level: level * (omega if omega > 0.0 else -2.0))
-
+# Helpers, also by named arguments in another order; constants of the file and of modules, a negative one to a power;
+# names that are imported; choices, logic and selections; powers.
 VECTOR = [
-    plain, with_helper, with_helper_by_name, helper_named_as_port, helper_of_helper, constants, constants_of_modules,
-    imported_by_name, choice, logic, several_lines, where_and_clip, three_at_once, defaults, powers, closed_over, short,
-    *pair, nested_selections,
+    plain, several_lines, defaults, made(2.0),
+    lambda omega, level: -level * smooth_sign(omega),
+    lambda omega, level: -level * smooth_sign(width=0.1, x=omega),
+    lambda omega, level: torque(level * omega),
+    lambda omega, level: s(torque(level * omega)),
+    lambda omega, level: level * (NEGATIVE**EXPONENT * omega + NEGATIVE**5 * WIDTH) / 9.0,
+    lambda omega, level: -level * omega * math.pi / np.pi + math.e * 0.0,
+    lambda omega, level: -level * direction_of(omega) * sqrt(abs(omega) + 1.0),
+    lambda omega, level: -level if omega > 0.0 else (level if omega < 0.0 else 0.0),
+    lambda omega, level: -level * (1.0 if (0.0 < omega <= 0.2 and not level > 100.0) or omega > 1.0 else 0.5),
+    lambda omega, level: -level * np.clip(np.where(np.abs(omega) > 0.1, omega, 0.0), -0.5, 0.5),
+    lambda omega, level: -min(level, max(omega, 0.1, -omega), 5.0),
+    lambda omega, level: -level * (omega**2 + omega**3 + abs(omega) ** 1.5 + (1.0 + omega**2) ** -1),
+    lambda omega, level: -level * np.abs(omega) ** 0.5,
+    lambda omega, level: np.where(omega > 0.3, -level, np.where(omega > 0.1, -0.5 * level, 0.0)),
+    *(lambda omega, level: level + omega * 0.0, lambda omega, level: level * (omega if omega > 0.0 else -2.0)),
 ]  # fmt: skip
-BY_LANE = [branches, loop, repeated, rare, calls_branches, names_of_the_loop]
+# Calls that no lanes have, and a helper that makes its caller run lane by lane.
+BY_LANE = [
+    branches, loop, repeated, names_of_the_loop,
+    lambda omega, level: -level * (np.arcsinh(omega) + math.expm1(omega) + omega % 0.1),
+    lambda omega, level: -level * (np.ceil(omega) + round(omega, 2)),
+    lambda omega, level: 0.5 * branches(omega, level),
+]  # fmt: skip

@@ -67,12 +67,11 @@ def test_a_second_process_compiles_nothing_and_damaged_code_is_compiled_again(tm
     assert len(list(folder.rglob("*.py.bin"))) == 1
     assert not list(folder.rglob("*.part"))
     assert {f["last"] for f in first} == {again["last"]}
-    for i, kind in enumerate(("emptied", "flipped")):
-        for file in listing(folder):
-            Path(file).write_bytes(damaged(Path(file).read_bytes())[3 * i])
-        mended, then = result(start(folder)), result(start(folder))
-        assert (mended["misses"], then["hits"]) == (1, 1), kind
-        assert mended["last"] == then["last"] == again["last"], kind
+    for file in listing(folder):
+        Path(file).write_bytes(damaged(Path(file).read_bytes())[3])
+    mended, then = result(start(folder)), result(start(folder))
+    assert (mended["misses"], then["hits"]) == (1, 1)
+    assert mended["last"] == then["last"] == again["last"]
 
 
 def effect_of(folder: Path, text: str) -> Effect:
@@ -97,11 +96,6 @@ def test_a_module_is_named_by_its_equations(tmp_path: Path) -> None:
     assert len(set(names[:-1])) == len(texts) - 1
     assert names[-1] == names[0]
     assert names[0] != module_name(kernel_parts(models[0], 4))
-
-
-def test_a_known_model_is_looked_up(arm: Model) -> None:
-    assert compile_model(arm)[0] is compile_model(arm)[0]
-    assert compile_model(arm)[0] is compile_model(Model(PLANTS["shell_transfer_arm"]))[0]
 
 
 def test_a_cache_that_cannot_be_written_is_done_without(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

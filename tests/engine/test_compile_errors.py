@@ -25,20 +25,12 @@ def unknown_object(omega, level):
     return TABLE["a"] * omega * level
 
 
-def unknown_module(omega, level):
-    return random.random() * omega * level
-
-
 def nothing_returned(omega, level):
     omega + level
 
 
 def odd_default(omega, level, table=TABLE):
     return omega * level
-
-
-def of_arrays(omega, level):
-    return level * np.linalg.norm(omega)
 
 
 def sometimes_nothing(omega, level):
@@ -51,14 +43,6 @@ def imports(omega, level):
     import math
 
     return math.sin(omega) * level
-
-
-def unknown_builtin(omega, level):
-    return sorted([omega, level])
-
-
-def or_of_numbers(omega, level):
-    return -level / (omega or 1e-9)
 
 
 def plain(omega, level):
@@ -76,22 +60,24 @@ typed: dict[str, Any] = {}
 exec("def typed_in(omega, level): return -omega * level", typed)
 
 TOLD = {
-    "or": (or_of_numbers, "'omega or 1e-09' joins numbers by `or`: conditions are expected"),
+    "or": (lambda omega, level: -level / (omega or 1e-9),
+            "'omega or 1e-09' joins numbers by `or`: conditions are expected"),
     "calls itself": (itself, "the equation itself calls itself: write it as a loop"),
     "object": (unknown_object, r"the equation unknown_object uses 'TABLE' \(dict\), which cannot be compiled: numpy"),
-    "module": (unknown_module, r"the equation unknown_module uses 'random' \(module\), which cannot be compiled"),
-    "builtin": (unknown_builtin, "the equation unknown_builtin uses 'sorted', which cannot be compiled"),
+    "module": (lambda omega, level: random.random() * level, r"uses 'random' \(module\), which cannot be compiled"),
+    "builtin": (lambda omega, level: sorted([omega, level]), "uses 'sorted', which cannot be compiled"),
     "no return": (nothing_returned, "the equation nothing_returned returns nothing: a number is expected"),
     "default": (odd_default, "the equation odd_default has the default {'a': 1.0}: a number is expected"),
     "no source": (typed["typed_in"], "the source of the equation typed_in cannot be read: define it in a file"),
     "partial": (functools.partial(plain), "is not a plain Python function: write it as a def"),
     "method": (Owner().method, "the equation Owner.method is not a plain Python function: write it as a def"),
-}
+}  # fmt: skip
 COMPILED = {
-    "arrays": (of_arrays, r"the equation 'bad.torque' cannot be compiled \(numba has no norm\(float64\)\): numpy"),
+    "arrays": (lambda omega, level: level * np.linalg.norm(omega),
+               r"the equation 'bad.torque' cannot be compiled \(numba has no norm\(float64\)\): numpy"),
     "import": (imports, r"the equation 'bad.torque' cannot be compiled \(numba: Use of unsupported opcode"),
     "None": (sometimes_nothing, r"the equation 'bad.torque' cannot be compiled \(it does not return a number in every"),
-}
+}  # fmt: skip
 
 
 def refused(function: Callable[..., Any], sentence: str) -> ArmidError:

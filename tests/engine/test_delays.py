@@ -224,18 +224,6 @@ def late_switch(late):
     return late
 
 
-def test_the_signal_is_smooth_in_the_delay_across_steps_and_samples():
-    """What a candidate of a computed signal loses where its delay crosses a step is far below the engine's error."""
-    model = Model(AXIS) + SPRING
-    manoeuvre = Manoeuvre(STEP_S, N_SAMPLES, {"start_speed": 0.3}, {"u": DRIVE}, "zero")
-    for low, high in ((0.0, 1e-3), (1.9e-3, 2.1e-3), (3.9e-3, 4.1e-3)):
-        delays = np.linspace(low, high, 401)
-        rows = [{"mass": MASS, "spring.stiffness": 20.0, "spring.delay": d} for d in delays]
-        slope = np.diff(simulate(model, manoeuvre, candidates(model, rows), Schedule(2)).output, axis=0)
-        slope /= delays[1] - delays[0]
-        assert np.abs(np.diff(slope, axis=0)).max() <= 1e-3 * np.abs(slope).max()
-
-
 def test_one_effect_under_two_names_is_looked_for_once():
     late = {name: EFFECTS[name] for name in ("drive_delay", "controller_delay", "drive_lag")}
     forms = {name: next(f for f in e.every_form if "drive" in f.adds) for name, e in late.items()}

@@ -47,6 +47,10 @@ def test_neighbours_that_use_other_effects_change_nothing(
     for candidate, output in zip(population, together, strict=True):
         np.testing.assert_array_equal(simulate(wide, manoeuvres["lower"], candidate, schedule).output[0], output)
     assert len(np.unique(together.round(9), axis=0)) == len(NAMES) + 1
+    # a strength that is no number is not taken for the null
+    candidate = using(wide, plain, "")
+    candidate[list(wide.parameters).index("viscous.slope")] = np.nan
+    assert simulate(wide, manoeuvres["lower"], candidate, schedule).failed.all()
 
 
 def test_the_motion_is_that_of_the_model_without_what_is_inactive(
@@ -61,11 +65,3 @@ def test_the_motion_is_that_of_the_model_without_what_is_inactive(
         expected = simulate(small, manoeuvres["lower"], [values[n] for n in small.parameters], even).output
         found = simulate(wide, manoeuvres["lower"], candidate, even).output
         np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12)
-
-
-def test_a_strength_that_is_no_number_is_not_taken_for_the_null(
-    arm: Model, wide: Model, manoeuvres: dict[str, Manoeuvre], schedule: Schedule
-) -> None:
-    candidate = using(wide, drawn(arm, 1, 9)[0], "")
-    candidate[list(wide.parameters).index("viscous.slope")] = np.nan
-    assert simulate(wide, manoeuvres["lower"], candidate, schedule).failed.all()

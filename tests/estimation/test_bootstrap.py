@@ -79,17 +79,16 @@ def test_the_intervals_of_a_minimax_hold_the_truth_and_those_of_least_squares_do
     assert ((misses <= information.half_width).mean(axis=0) < 0.6).all()
 
 
-def test_without_convergence_there_is_no_interval(stroke, arm_space):
+def test_without_convergence_or_noise_and_where_nothing_is_determined_there_is_no_interval(
+    stroke, arm_space, monkeypatch
+):  # fmt: skip
+    monkeypatch.setattr(bootstraps, "FIRST_DRAWS", 25)
     information = information_at((stroke,), arm_space, TRUTH)
     stepped = bootstrap(FITNESS["shape_similarity"], (stroke,), arm_space, TRUTH, information)
     assert "does not converge in" in stepped.doubt
     assert np.isnan([stepped.low, stepped.high, stepped.bias]).all()
     away = bootstrap(MINIMAX, (stroke,), arm_space, TRUTH + 60.0 * information.deviation * [1, 0, 0, 0], information)
     assert away.doubt == "the search has not come to the minimum of minimax"
-
-
-def test_without_noise_and_where_nothing_is_determined_there_is_no_interval(stroke, arm_space):
-    information = information_at((stroke,), arm_space, TRUTH)
     silent = replace(information, levels=(Level(0.0, 1.0),))
     assert "holds no noise" in bootstrap(MINIMAX, (stroke,), arm_space, TRUTH, silent).doubt
     lost = replace(information, deviation=information.deviation * [1, np.inf, 1, 1])

@@ -13,6 +13,7 @@ from armid.model import EFFECTS, Model
 from armid.problem.problem import replays
 from armid.problem.space import space_of
 from armid.record import read_campaign
+from synthetic import write_records
 from winch import DRUM, FRICTION, INTERVAL, exact_speed, held_voltage, winch
 
 NOISE, DELAY = 0.12, 0.0142
@@ -21,18 +22,15 @@ PLUGIN = f"{Path(__file__).parents[1] / 'winch.py'}:winch"
 
 def written(folder, rng, times=None):
     """Write a campaign of two records of the winch; times: grid, rng -> times and which samples, None: all, even."""
-    folder.mkdir(exist_ok=True)
-    lines = ['name = "winch"', 'plant = "winch"']
-    for name in ("a.csv", "b.csv"):
-        u = held_voltage(np.random.default_rng(len(lines)))
+    tables = {}
+    for name, seed in (("a.csv", 2), ("b.csv", 5)):
+        u = held_voltage(np.random.default_rng(seed))
         grid = INTERVAL * np.arange(len(u))
         t, kept = (grid, slice(None)) if times is None else times(grid, rng)
         speed = exact_speed(u[kept], DELAY, t) + NOISE * rng.standard_normal(len(t))
-        np.savetxt(folder / name, np.column_stack([t, speed, u[kept]]), delimiter=",", comments="", fmt="%.9g",
-                   header="time_s,angular_velocity_rad_s,volts_V")  # fmt: skip
-        lines += ["[[records]]", f'file = "{name}"', 'role = "train"']
-    (folder / "campaign.toml").write_text("\n".join(lines) + "\n")
-    return read_campaign(folder, {"winch": winch})
+        tables[name] = {"time_s": np.round(t, 9), "angular_velocity_rad_s": speed, "volts_V": u[kept]}
+    head = 'name = "winch"\nplant = "winch"\n'
+    return read_campaign(write_records(folder, head, tables, holdout=0), {"winch": winch})
 
 
 def late_model():

@@ -1,21 +1,23 @@
-"""A fast axis with few samples a second and no rest: differences of its motion tell of the motion, not of the noise."""
+"""Motions that mislead: a fast axis with few samples and no rest, a pendulum upright, an axis with sharp friction."""
 
 import numpy as np
 import pytest
 
+import armid
 from armid.estimation.information import start_changes
 from armid.inference import prepared
 from armid.inference.checks import holdout_residuals
 from armid.inference.model import unless_diverged
 from armid.inference.whitening import WhiteRecords, whitened
+from armid.loop import close_loop
 from armid.model import EFFECTS, Model
 from armid.problem.problem import replays
 from armid.problem.space import space_of
-from armid.record import read_campaign, write_campaign
+from armid.record import read_campaign
+from synthetic import write_records
 
 pytestmark = pytest.mark.slow
 MASS, NOISE, STEP_S, N = 2.0, 0.02, 0.05, 200
-RECORD = '[[records]]\nfile = "{file}"\nrole = "{role}"\n'
 
 
 @pytest.fixture(scope="module")
@@ -27,9 +29,8 @@ def fast(tmp_path_factory):
         speed = np.append(0.0, np.cumsum(force[:-1]) * STEP_S / MASS)
         tables[file] = {"time_s": STEP_S * np.arange(N), "velocity_m_s": speed + NOISE * rng.standard_normal(N),
                         "drive_N": force}  # fmt: skip
-    entries = [RECORD.format(file=f, role="holdout" if f == "c.csv" else "train") for f in tables]
-    text = 'name = "fast"\nplant = "driven_axis"\nhold = "zero"\n' + "".join(entries)
-    return read_campaign(write_campaign(tmp_path_factory.mktemp("fast"), text, tables))
+    head = 'name = "fast"\nplant = "driven_axis"\nhold = "zero"\n'
+    return read_campaign(write_records(tmp_path_factory.mktemp("fast"), head, tables))
 
 
 @pytest.fixture(scope="module")
@@ -63,12 +64,55 @@ def test_the_doubt_of_a_start_bends_where_the_motion_does(tmp_path, start, least
     times, rng = 0.01 * np.arange(100), np.random.default_rng(2)
     table = {"time_s": times, "angle_rad": start + 0.01 * rng.standard_normal(100), "drive_N_m": 0.0 * times,
              "angular_velocity_rad_s": 0.1 + 0.2 * rng.standard_normal(100)}  # fmt: skip
-    text = 'name = "p"\nplant = "driven_axis"\n[constants]\ngain = 1.0\ngravity_moment = 0.5\n'
-    text += "".join(RECORD.format(file=f, role=role) for f, role in (("p.csv", "train"), ("q.csv", "holdout")))
-    campaign = read_campaign(write_campaign(tmp_path / "p", text, {"p.csv": table, "q.csv": table}))
+    head = 'name = "p"\nplant = "driven_axis"\n[constants]\ngain = 1.0\ngravity_moment = 0.5\n'
+    campaign = read_campaign(write_records(tmp_path / "p", head, {"p.csv": table, "q.csv": table}))
     model = Model(campaign.plant)
     space = space_of(model, {}, {"inertia": (0.01, 0.03)})
     records = WhiteRecords(replays(campaign.holdout, model, space), space, whitened(campaign.holdout, campaign.plant))
     slope, bend = np.array(list(start_changes(records, np.array([0.5]), bent=True)))[:2]
     assert next(start_changes(records, np.array([0.5]))) == pytest.approx(slope)
     assert least <= np.linalg.norm(bend) / np.linalg.norm(slope) <= most
+
+
+LEVEL, OFF, TOLERANCE, SMALL_NOISE = 1.5, 1.04, 0.03, 5e-5
+HEAD = """\
+name = "sharp"
+plant = "driven_axis"
+effects = ["coulomb"]
+hold = "zero"
+[constants]
+gain = {gain}
+[tolerances]
+gain = {tolerance}
+[parameters."coulomb.width"]
+fixed = 0.001
+"""
+
+
+def tables(rng):
+    times = 0.005 * np.arange(800)
+    for _ in range(3):
+        waves = zip(rng.uniform(0.3, 3.0, 5), rng.uniform(0.0, 6.0, 5), strict=True)
+        force = 2.5 * sum(np.sin(2.0 * np.pi * f * times + p) for f, p in waves) * (times > 0.4)
+        yield {"time_s": times, "velocity_m_s": force, "drive_N": force}
+
+
+def campaign(folder, records, gain):
+    return read_campaign(write_records(folder, HEAD.format(gain=gain, tolerance=TOLERANCE), records, holdout=0))
+
+
+def test_force_mass_and_friction_that_grow_alike_are_not_told_apart_by_sharp_friction(tmp_path):
+    rng = np.random.default_rng(2)
+    records = {f"r{i}.csv": table for i, table in enumerate(tables(rng))}
+    made = armid.simulate(campaign(tmp_path / "made", records, OFF), parameters={"mass": MASS, "coulomb.level": LEVEL})
+    for file, table in records.items():
+        speed = made.tables[file]["velocity_m_s"]
+        table["velocity_m_s"] = speed + SMALL_NOISE * rng.standard_normal(len(speed))
+    declared = campaign(tmp_path / "declared", records, 1.0)
+    found = close_loop(declared.model(), declared, {"torque_offset": EFFECTS["torque_offset"]})
+    assert (found.verdict, found.steps) == ("no_discrepancy", ())
+    for name, truth in (("mass", MASS), ("coulomb.level", LEVEL)):
+        estimate = next(e for e in found.before.estimates if e.name == name)
+        assert estimate.value == pytest.approx(truth / OFF, rel=0.01)
+        assert estimate.high - estimate.low == pytest.approx(2 * 1.96 * TOLERANCE * estimate.value, rel=0.15)
+        assert estimate.low < truth < estimate.high

@@ -32,6 +32,9 @@ def test_yule_walker_finds_the_terms_from_the_exact_covariance():
 
 
 def test_filter_turns_the_covariance_into_the_unit_matrix():
+    white = coloured_level(list(np.random.default_rng(3).standard_normal((4, 500))), 1.0, 2000)
+    assert white.is_white
+    np.testing.assert_array_equal(white_level(0.5, 100).white(np.ones(4), [4]), 2.0 * np.ones(4))
     rng = np.random.default_rng(1)
     rests = [lfilter([1.0], [1.0, *-TERMS], rng.standard_normal(6000))[1000:] for _ in range(4)]
     rms = float(np.sqrt(autocovariance(TERMS, 1)[0]))
@@ -48,13 +51,6 @@ def test_pieces_are_filtered_each_on_its_own():
     both = level.white(values, [20, 30])
     np.testing.assert_array_equal(both[:, :20], level.white(values[:, :20], [20]))
     np.testing.assert_array_equal(both[:, 20:], level.white(values[:, 20:], [30]))
-
-
-def test_white_noise_is_only_scaled():
-    rng = np.random.default_rng(3)
-    level = coloured_level([rng.standard_normal(500) for _ in range(4)], 1.0, 2000)
-    assert level.is_white
-    np.testing.assert_array_equal(white_level(0.5, 100).white(np.ones(4), [4]), 2.0 * np.ones(4))
 
 
 def test_coloured_noise_counts_fewer_samples():

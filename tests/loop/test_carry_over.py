@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 import armid
+from synthetic import write_records
 
 pytestmark = pytest.mark.slow
 STEP, N, INERTIA, FRICTION = 0.01, 600, 0.02, 0.05
-TOML = """\
+HEAD = """\
 name = "axis"
 plant = "driven_axis"
 effects = ["viscous"]
@@ -15,36 +16,24 @@ hold = "zero"
 [parameters.inertia]
 low = 0.002
 high = 0.2
-[[records]]
-file = "a.csv"
-role = "train"
-[[records]]
-file = "b.csv"
-role = "train"
-[[records]]
-file = "held.csv"
-role = "holdout"
 """
 
 
-def write(folder, file, amplitude, seed, inertia=INERTIA, most=np.inf):
-    """Write a record of a motor whose drive gives no more than some effort; exact between samples."""
+def table(amplitude, seed, inertia=INERTIA, most=np.inf):
+    """Return a record of a motor whose drive gives no more than some effort; exact between samples."""
     rng = np.random.default_rng(seed)
     drive = np.repeat(amplitude * rng.choice([-1.0, -0.4, 0.4, 1.0], N // 20), 20)
     keeps, speed = np.exp(-FRICTION * STEP / inertia), [0.0]
     for effort in np.clip(drive, -most, most)[:-1]:
         speed.append(keeps * speed[-1] + (1.0 - keeps) * effort / FRICTION)
     measured = np.array(speed) + 0.02 * rng.standard_normal(N)
-    table = np.column_stack([STEP * np.arange(N), measured, drive])
-    np.savetxt(folder / file, table, delimiter=",", header="time_s,angular_velocity_rad_s,drive_V", comments="")
+    return {"time_s": STEP * np.arange(N), "angular_velocity_rad_s": measured, "drive_V": drive}
 
 
 def closed(folder, **held):
-    (folder / "campaign.toml").write_text(TOML)
-    write(folder, "a.csv", 1.0, 1)
-    write(folder, "b.csv", 1.0, 2)
-    write(folder, "held.csv", seed=3, **held)
-    return armid.close_loop(folder, candidates=["torque_offset"], curve=False)
+    tables = {"a.csv": table(1.0, 1), "b.csv": table(1.0, 2), "held.csv": table(seed=3, **held)}
+    campaign = write_records(folder / "axis", HEAD, tables)
+    return armid.close_loop(campaign, candidates=["torque_offset"], curve=False)
 
 
 def test_a_record_of_more_drive_than_any_train_record(tmp_path):

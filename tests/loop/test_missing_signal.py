@@ -14,8 +14,9 @@ from armid.loop.figures import figures_of
 from armid.model import Model
 from armid.problem.problem import replays
 from armid.problem.space import space_of
-from armid.record import read_campaign, write_table
+from armid.record import read_campaign
 from armid.report.style import save
+from synthetic import moved, write_records
 
 MASS, NOISE = 2.0, 2e-4
 
@@ -25,32 +26,17 @@ def spring(position):
     return -0.8 * np.maximum(0.0, position - 0.3)
 
 
-def motion(drive, missing, interval=0.005, substeps=20):
-    """Return speed and position on the samples (semi-implicit Euler, fine steps)."""
-    v, q, speeds, positions = 0.0, 0.0, [], []
-    for u, following in zip(drive, np.append(drive[1:], drive[-1]), strict=True):
-        speeds.append(v)
-        positions.append(q)
-        for i in range(substeps):
-            v += interval / substeps * (u + (following - u) * i / substeps + missing(q)) / MASS
-            q += interval / substeps * v
-    return np.array(speeds), np.array(positions)
-
-
 @pytest.fixture(scope="module")
 def axis(tmp_path_factory):
     """Three records of an axis with an undeclared spring: model with the mass known, campaign, replays."""
-    folder = tmp_path_factory.mktemp("spring")
-    times, text = 0.005 * np.arange(400), 'name = "spring"\nplant = "driven_axis"\n'
-    rng = np.random.default_rng(5)
-    for i, rate in enumerate((3.0, 3.7, 4.6)):
+    times, rng, tables = 0.005 * np.arange(400), np.random.default_rng(5), {}
+    for rate in (3.0, 3.7, 4.6):
         drive = 4.0 * np.sin(rate * times)
-        speed, position = motion(drive, spring)
-        columns = {"time_s": times, "velocity_m_s": speed + NOISE * rng.standard_normal(400), "drive_N": drive}
-        write_table(folder / f"r{i}.csv", columns | {"position_m": position})
-        text += f'[[records]]\nfile = "r{i}.csv"\nrole = "train"\n'
-    (folder / "campaign.toml").write_text(text, encoding="utf-8")
-    campaign = read_campaign(folder)
+        position, speed = moved(lambda x, u: np.array([x[1], (u + spring(x[0])) / MASS]), drive, 0.005, (0.0, 0.0)).T
+        tables[f"r{rate}.csv"] = {"time_s": times, "velocity_m_s": speed + NOISE * rng.standard_normal(400),
+                                  "drive_N": drive, "position_m": position}  # fmt: skip
+    head = 'name = "spring"\nplant = "driven_axis"\n'
+    campaign = read_campaign(write_records(tmp_path_factory.mktemp("spring") / "axis", head, tables, holdout=0))
     model = Model(campaign.plant)
     space = space_of(model, fixed={"mass": MASS})
     return model, space, replays(campaign.train, model, space)

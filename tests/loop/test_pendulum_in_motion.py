@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.signal import lfilter
 
 from armid.estimation.least_squares import with_fitted_starts
@@ -12,23 +11,20 @@ from armid.loop import close_loop, report_of
 from armid.model import EFFECTS, Model
 from armid.problem.problem import by_record, replays
 from armid.problem.space import space_of
-from armid.record import read_campaign, write_campaign
+from armid.record import read_campaign
+from synthetic import moved, write_records
 
 INERTIA, GRAVITY_MOMENT, NOISE, STEP_S = 0.02, 0.5, 0.02, 0.005
-RECORD = '[[records]]\nfile = "{file}"\nrole = "{role}"\n'
 TOML = 'name = "swinging"\nplant = "driven_axis"\nhold = "zero"\n[constants]\ngain = 1.0\ngravity_moment = 0.5\n'
 
 
 def swing(torque, friction, start):
-    """Angle [rad] and speed [rad/s] of each sample, from a start (angle, speed), by another integrator."""
-    states = [np.array(start)]
-    for u in torque[:-1]:
+    """Angle [rad] and speed [rad/s] of each sample, from a start (angle, speed)."""
 
-        def rates(_, y, u=u):
-            return [y[1], (u - GRAVITY_MOMENT * np.sin(y[0]) - friction * y[1]) / INERTIA]
+    def rates(x, u):
+        return np.array([x[1], (u - GRAVITY_MOMENT * np.sin(x[0]) - friction * x[1]) / INERTIA])
 
-        states.append(solve_ivp(rates, (0.0, STEP_S), states[-1], rtol=1e-8, atol=1e-10).y[:, -1])
-    return np.array(states).T
+    return moved(rates, torque, STEP_S, start, "zero").T
 
 
 def swinging(folder, friction, rho=0.35, n_records=4, seed=3, toml=TOML):
@@ -43,9 +39,7 @@ def swinging(folder, friction, rho=0.35, n_records=4, seed=3, toml=TOML):
         noise = NOISE * lfilter([np.sqrt(1.0 - rho**2)], [1.0, -rho], rng.standard_normal(len(times)))
         tables[f"r{i}.csv"] = {"time_s": times, "angular_velocity_rad_s": speed + noise, "drive_N_m": torque,
                                "angle_rad": angle + 1e-4 * rng.standard_normal(len(times))}  # fmt: skip
-    roles = ["train"] * (n_records - 1) + ["holdout"]
-    entries = [RECORD.format(file=file, role=role) for file, role in zip(tables, roles, strict=True)]
-    return read_campaign(write_campaign(folder, toml + "".join(entries), tables)), starts
+    return read_campaign(write_records(folder, toml, tables)), starts
 
 
 def test_the_start_of_an_axis_is_fitted(tmp_path):
@@ -72,10 +66,8 @@ def over_the_top(folder, commands, limit=np.inf):
         tables[f"r{i}.csv"] = {"time_s": STEP_S * np.arange(len(command)), "drive_N_m": command,
                                "angle_rad": angle + 1e-3 * rng.standard_normal(len(command))}  # fmt: skip
     assert max(np.ptp(table["angle_rad"]) for table in tables.values()) > 2.0 * np.pi
-    roles = ["train"] * (len(tables) - 1) + ["holdout"]
-    entries = [RECORD.format(file=file, role=role) for file, role in zip(tables, roles, strict=True)]
     toml = 'name = "over"\nplant = "rotary_arm"\nhold = "zero"\n[parameters.gain]\nfixed = 1.0\n'
-    return read_campaign(write_campaign(folder, toml + "".join(entries), tables))
+    return read_campaign(write_records(folder, toml, tables))
 
 
 def test_a_pendulum_that_goes_over_the_top_is_estimated_from_the_beginning_of_its_records(tmp_path):

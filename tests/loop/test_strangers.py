@@ -1,17 +1,16 @@
-"""Machines that no shipped plant describes: a carriage with a coarse encoder, an unbalanced disc fed by voltage."""
+"""Machines of coarse encoders: a carriage that no shipped plant describes, a disc, an arm that sticks."""
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 from scipy.signal import lsim
 
 from armid import Constant, Input, Output, Parameter, Plant, Scales, State
 from armid.loop import close_loop, report_of
 from armid.model import EFFECTS
-from armid.record import read_campaign, write_campaign
+from armid.record import RecordWarning, read_campaign
+from synthetic import moved, write_records
 
 pytestmark = pytest.mark.slow
-RECORD = '[[records]]\nfile = "{}"\nrole = "{}"\n'
 MASS, DAMPING, STEP_MM, OWN_MM, LATE_S = 4.1, 47.0, 0.02, 0.008, 0.013
 INERTIA, TORQUE_CONSTANT, FRICTION, MOMENT, RESISTANCE, DEAD_V = 0.02, 0.25, 0.01, 0.15, 1.2, 0.8
 
@@ -74,10 +73,8 @@ def carriage_records(rng, late):
 
 def campaign(folder, plant, records):
     files = {f"r{i}.csv": table for i, table in enumerate(records)}
-    roles = ["train"] * (len(files) - 1) + ["holdout"]
-    entries = map(RECORD.format, files, roles)
-    return read_campaign(write_campaign(folder, f'name = "{plant.name}"\nplant = "{plant.name}"\n' + "".join(entries),
-                                        files), {plant.name: plant})  # fmt: skip
+    head = f'name = "{plant.name}"\nplant = "{plant.name}"\n'
+    return read_campaign(write_records(folder, head, files), {plant.name: plant})
 
 
 def test_an_encoder_that_is_fine_for_its_travel_and_coarse_for_its_noise(tmp_path):
@@ -99,18 +96,9 @@ def test_an_encoder_that_is_fine_for_its_travel_and_coarse_for_its_noise(tmp_pat
     assert report_of(found)["noise_rms"] == pytest.approx(truth, rel=0.06)
 
 
-def turned(voltage, interval):
-    """Speed of the disc at each sample, by another integrator."""
-    states = [np.zeros(2)]
-    for u in voltage[:-1]:
-        fed = np.sign(u) * max(abs(u) - DEAD_V, 0.0)
-
-        def rates(_, y, fed=fed):
-            current = (fed - TORQUE_CONSTANT * y[1]) / RESISTANCE
-            return [y[1], (TORQUE_CONSTANT * current - FRICTION * y[1] - MOMENT * np.sin(y[0])) / INERTIA]
-
-        states.append(solve_ivp(rates, (0.0, interval), states[-1], rtol=1e-8, atol=1e-9).y[:, -1])
-    return np.array(states)[:, 1]
+def turning(x, fed):
+    current = (fed - TORQUE_CONSTANT * x[1]) / RESISTANCE
+    return np.array([x[1], (TORQUE_CONSTANT * current - FRICTION * x[1] - MOMENT * np.sin(x[0])) / INERTIA])
 
 
 def disc_records(rng, n_records, n_steps, n_rest):
@@ -118,7 +106,8 @@ def disc_records(rng, n_records, n_steps, n_rest):
     for _ in range(n_records):
         voltage = np.repeat(rng.uniform(-9.0, 9.0, n_steps), 40)
         voltage[:n_rest] = 0.0
-        speed = turned(voltage, 0.01) + rng.normal(0.0, 0.06, len(voltage))
+        fed = np.sign(voltage) * np.maximum(np.abs(voltage) - DEAD_V, 0.0)
+        speed = moved(turning, fed, 0.01, (0.0, 0.0), "zero", 4)[:, 1] + rng.normal(0.0, 0.06, len(voltage))
         yield {"time_s": 0.01 * np.arange(len(voltage)), "voltage_V": voltage, "angular_velocity_rad_s": speed}
 
 
@@ -139,3 +128,38 @@ def test_what_the_added_effect_cannot_be_told_apart_from_widens_its_own_strength
     for model, fit in parents.items():
         less = [parents[model - {h}] for h in model if h.kind == "effect" and model - {h} in parents]
         assert all(fit.chi2 < 1.01 * other.chi2 for other in less), model
+
+
+STICKING = """\
+name = "wheel"
+plant = "rotary_arm"
+hold = "zero"
+[parameters]
+inertia = { fixed = 1.0 }
+gravity_moment = { low = 50, high = 300 }
+damping = { low = 0.0, high = 10.0 }
+"""
+
+
+def sticking(x, u):
+    return np.array([x[1], u - 1.5 * x[1] - 6.0 * np.tanh(x[1] / 0.02) - 130.0 * np.sin(x[0])])
+
+
+def test_sticks_of_a_coarse_encoder_tell_of_dry_friction(tmp_path):
+    rng, interval, n, step = np.random.default_rng(7), 0.01, 2000, 2.0 * np.pi / 4096
+    tables = {}
+    for file in ("a.csv", "b.csv"):
+        phases = rng.uniform(0.0, 2.0 * np.pi, 3)
+        times = interval * np.arange(n)
+        drive = sum(size * np.sin(w * times + p) for size, w, p in zip((30, 20, 15), (1.1, 2.7, 4.9), phases))
+        angle = moved(sticking, drive, interval, (0.0, 0.0), "zero", 4)[:, 0]
+        # a clock that is a little uneven
+        uneven = times + 0.02 * interval * rng.uniform(-1.0, 1.0, n)
+        tables[file] = {"time_s": uneven, "drive_N_m": drive, "angle_rad": np.round(angle / step) * step}
+    with pytest.warns(RecordWarning, match="irregular sampling"):
+        read = read_campaign(write_records(tmp_path / "stick", STICKING, tables))
+    found = close_loop(read.model(), read, {name: EFFECTS[name] for name in ("coulomb", "viscous", "output_lag")})
+    report = report_of(found)
+    assert report["suspects"] == []
+    assert "coulomb" in report["effects"]
+    assert report["error"]["after"]["holdout"]["rmse"] < 4.0 * step

@@ -9,7 +9,7 @@ import pytest
 
 from armid.contract.trials import PlainModel
 from armid.errors import ArmidError
-from armid.model import EFFECTS, PLANTS, Constant, Effect, Manoeuvre, Model, Output, Parameter, State
+from armid.model import EFFECTS, PLANTS, Effect, Manoeuvre, Model, Output, Parameter, State
 from armid.model.plants.shell_transfer_arm import gravity_level, gravity_moment
 
 ARM, AXIS = PLANTS["shell_transfer_arm"], PLANTS["driven_axis"]
@@ -149,8 +149,6 @@ DECLARED = {
                     "effect 'e' declares 'level' twice: each name once is expected"),
     "reserved": (lambda: Effect("rate", LEVEL, {"torque": zero}), "effect 'rate' cannot have this name: rate"),
     "effect's name": (lambda: Effect("my effect", LEVEL, {"torque": zero}), "effect 'my effect' is not a usable name"),
-    "constant twice": (lambda: replace(AXIS, constants=(*AXIS.constants, Constant("v", 1.0, "1"))),
-                       "plant 'driven_axis' declares 'v' twice"),
     "output": (lambda: replace(AXIS, output="recorded_sped"), "plant 'driven_axis' records 'recorded_sped': did you"),
     "signal is an alias": (lambda: replace(AXIS, outputs=(Output("s", "omega", "m/s"),), output="", output_unit=""),
                            "plant 'driven_axis' records 'omega', another name for 'v': 'v' is expected"),
@@ -162,9 +160,7 @@ DECLARED = {
     "unit of scales with a space": (
         lambda: (Model(AXIS) + Effect("e", (Parameter("c", "effort / speed", 0.0, 1.0),), {"torque": zero})).parameters,
         "unit 'effort / speed' is not a product of scales: words joined by"),
-    "alias": (lambda: replace(AXIS, aliases={"omega": "w"}), "plant 'driven_axis' has the alias 'omega' for 'w': "),
     "name": (lambda: replace(AXIS, quantities={"a__b": zero}), "quantity, port or alias 'a__b' is not a usable name"),
-    "port": (lambda: replace(AXIS, ports={"time": "s"}), "quantity, port or alias 'time' cannot have this name"),
     "circle": (circle, "the equations run in a circle: a -> b -> c -> a; use a state or an earlier"),
     "unknown": (unknown, "plant 'driven_axis', quantity 'drive_effort', asks for 'voltage', which"),
 }  # fmt: skip

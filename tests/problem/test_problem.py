@@ -1,6 +1,7 @@
-"""Identification as a problem of pymoo: any algorithm, an exact budget, and the records joined as declared."""
+"""Identification as a problem of pymoo: its space, records ready to be simulated, residuals, and an exact budget."""
 
 import copy
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,16 +11,21 @@ from pymoo.algorithms.soo.nonconvex.de import DE
 from pymoo.algorithms.soo.nonconvex.ga import GA
 from pymoo.algorithms.soo.nonconvex.nelder import NelderMead
 from pymoo.algorithms.soo.nonconvex.pso import PSO
+from pymoo.core.evaluator import Evaluator
+from pymoo.core.population import Population
 from pymoo.optimize import minimize
 
+from armid.engine import Schedule, accuracy_against, simulate
 from armid.errors import ArmidError
 from armid.identifiers import PaperPSO
-from armid.problem.fitness import FITNESS, Fitness
-from armid.problem.meter import PENALTY, Meter, MeterTermination
-from armid.problem.problem import IdentificationProblem, ReadyRecord, Replay, replays
+from armid.model import EFFECTS
+from armid.problem.fitness import FITNESS
+from armid.problem.meter import PENALTY, RESIDUALS, Meter, MeterTermination
+from armid.problem.problem import IdentificationProblem, ReadyRecord, Replay, ready_record, replays, residuals
 from armid.problem.similarity import similarity
 from armid.problem.space import space_of
-from armid.record import read_campaign
+from armid.record import Override, read_campaign
+from changed_records import with_noise
 
 TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])
 ALGORITHMS = {
@@ -67,20 +73,6 @@ def test_never_more_simulations_than_the_budget(arm_space, lowering_replays, nam
     assert meter.best_f < 0.5 * problem.value(0.5 * (problem.xl + problem.xu))[0]
 
 
-def test_a_diverging_candidate_is_penalised_and_counted(arm_space, lowering_replays):
-    def no_small_k(measured, simulated):
-        values = np.mean((simulated - measured) ** 2, axis=1)
-        return np.where(np.arange(len(values)) % 2, np.inf, values)
-
-    meter = Meter(10)
-    problem = IdentificationProblem(arm_space, lowering_replays, Fitness("mine", no_small_k), meter)
-    values = problem.evaluate(np.tile(TRUTH, (4, 1)))[:, 0]
-    assert values[1] == values[3] == PENALTY
-    assert values[0] == values[2] == meter.best_f < 1.0
-    assert (meter.used, meter.n_failed) == (4, 2)
-    assert np.isinf(problem.value(np.tile(TRUTH, (2, 1)))[1])
-
-
 def test_a_simulation_that_really_diverges(write_axis, axis_model, tmp_path):
     campaign = read_campaign(write_axis(tmp_path))
     # so strong a negative friction doubles the speed every millisecond
@@ -89,7 +81,8 @@ def test_a_simulation_that_really_diverges(write_axis, axis_model, tmp_path):
     values = problem.evaluate(np.array([[0.01, -10.0], [2.0, 5.0]]))[:, 0]
     assert values[0] == PENALTY
     assert values[1] < 1e-3
-    assert (problem.meter.used, problem.meter.n_failed) == (2, 1)
+    assert (problem.meter.used, problem.meter.n_failed, problem.meter.best_f) == (2, 1, values[1])
+    assert np.isinf(problem.value(np.array([[0.01, -10.0]]))[0])
 
 
 def by_hand(replay, x):
@@ -153,3 +146,133 @@ def test_without_a_free_parameter_or_a_record_it_is_refused(arm_space, lowering_
         IdentificationProblem(fixed, lowering_replays, FITNESS["rmse"])
     with pytest.raises(ArmidError, match="no record is given"):
         IdentificationProblem(arm_space, (), FITNESS["rmse"])
+
+
+def test_a_fixed_parameter_of_an_effect_stays_unless_bounds_free_it(arm):
+    model = arm + EFFECTS["coulomb"]
+    assert space_of(model).free_names == ("p0", "k", "eta3", "n", "coulomb.level")
+    freed = space_of(model, bounds={"coulomb.width": (0.001, 0.1)})
+    assert freed.free_names == ("p0", "k", "eta3", "n", "coulomb.level", "coulomb.width")
+    assert freed.units[-2:] == ("N m", "rad/s")
+
+
+def test_what_the_caller_says_wins_over_the_campaign_and_that_over_the_declaration(arm):
+    overrides = {"p0": Override(low=2.8e6), "k": Override(fixed=0.9), "n": Override(fixed=1.2, low=1.0, high=1.3),
+                 "coulomb.level": Override(fixed=3.0)}  # fmt: skip
+    space = space_of(arm, overrides, bounds={"k": (0.5, 0.7)}, fixed={"eta3": 0.6})
+    assert space.free_names == ("p0", "k")
+    np.testing.assert_array_equal(space.low[:2], [2.8e6, 0.5])
+    np.testing.assert_array_equal(space.high[:2], [3.5e6, 0.7])
+    np.testing.assert_array_equal(space.fixed, [np.nan, np.nan, 0.6, 1.2])
+
+
+def test_bounds_and_fixed_values_by_name_leave_the_space_itself_alone(arm_space):
+    changed = arm_space.with_bounds("n", 1.0, 1.2).with_fixed("p0", 3e6)
+    assert changed.free_names == ("k", "eta3", "n")
+    assert changed.with_bounds("p0", 2e6, 3e6).free_names == arm_space.names
+    assert arm_space.high[3] == 1.5
+    assert arm_space.free.all()
+
+
+def test_complete_puts_the_fixed_values_in(arm_space):
+    space = arm_space.with_fixed("k", 1.0)
+    whole = space.complete(np.array([[3e6, 0.5, 1.4], [2.7e6, 0.6, 1.1]]))
+    np.testing.assert_array_equal(whole, [[3e6, 1.0, 0.5, 1.4], [2.7e6, 1.0, 0.6, 1.1]])
+
+
+def test_signal_is_the_simulation_in_the_window(paper_arm, arm, arm_space):
+    record = paper_arm.with_window(0.2, 0.5).train[0]
+    (replay,) = ready_record(record, arm, arm_space).each
+    assert replay.measured.shape == replay.times.shape == (301,)
+    np.testing.assert_allclose(replay.times[[0, -1]], [0.2, 0.5])
+    np.testing.assert_array_equal(replay.measured, record.measured[200:501])
+    whole = simulate(arm, record.manoeuvre, TRUTH[np.newaxis], Schedule(4)).output[0]
+    np.testing.assert_allclose(replay.signal(TRUTH[np.newaxis])[0], whole[200:501], atol=1e-5)
+    assert 0.0 < replay.engine_error_at(TRUTH) < 1e-5
+
+
+def test_pieces_stand_end_to_end(write_axis, axis_model, tmp_path):
+    campaign = read_campaign(write_axis(tmp_path, more="restart_s = 0.5\n"))
+    (replay,) = ready_record(campaign.records[0], axis_model, space_of(axis_model)).each
+    assert len(replay.pieces) == 4
+    assert len({id(c) for c in replay.calibrations}) == 4
+    candidates = np.array([[2.0, 5.0], [3.0, 1.0]])
+    parts = [run.output for run in replay.ready.runs(candidates)]
+    np.testing.assert_array_equal(replay.signal(candidates), np.hstack(parts))
+    # a straight line through 20 ms is not quite the curved speed at a start
+    np.testing.assert_allclose(replay.signal(candidates)[0], replay.measured, atol=3e-4)
+
+
+def test_the_same_manoeuvre_is_calibrated_once(write_axis, axis_model, tmp_path):
+    record = read_campaign(write_axis(tmp_path, more="restart_s = 0.5\n")).records[0]
+    doubled = replace(record, pieces=(record.pieces[1], record.pieces[1], record.pieces[2]))
+    first, again, other = ready_record(doubled, axis_model, space_of(axis_model)).calibrations
+    assert first is again
+    assert other is not first
+
+
+def test_noise_decides_the_accuracy(paper_arm, arm, lowering):
+    record = lowering.train[0]
+    quiet = with_noise(record, rms=1e-6)
+    assert accuracy_against(record.noises, arm) == "standard"
+    assert accuracy_against(quiet.noises, arm) == "fine"
+    assert accuracy_against(with_noise(record, rms=0.0).noises, arm) == "fine"
+
+
+def test_a_given_accuracy_wins(lowering, arm, arm_space):
+    (fine,) = ready_record(lowering.train[0], arm, arm_space, "fine").each
+    assert fine.engine_error_at(TRUTH) < 2e-7
+    with pytest.raises(ArmidError, match="'finest' is unknown: standard or fine"):
+        ready_record(lowering.train[0], arm, arm_space, "finest")
+
+
+ASKED = ["F", "G", "H", RESIDUALS]
+
+
+@pytest.fixture(scope="module")
+def several(paper_arm, arm, arm_space):
+    records = [paper_arm.with_window(0.0, end).train[i] for i, end in ((0, 0.3), (3, 0.5))]
+    return replays(records, arm, arm_space)
+
+
+@pytest.fixture(scope="module", name="X")
+def candidates(arm_space):
+    return np.random.default_rng(1).uniform(arm_space.low, arm_space.high, (5, 4))
+
+
+def test_is_the_weighted_difference_end_to_end(several, arm_space, X):
+    vectors = residuals(several, arm_space, X, [2.0, 0.5])
+    assert vectors.shape == (5, 301 + 501)
+    np.testing.assert_array_equal(vectors[:, :301], 2.0 * (several[0].signal(X) - several[0].measured))
+    np.testing.assert_array_equal(vectors[:, 301:], 0.5 * (several[1].signal(X) - several[1].measured))
+    np.testing.assert_array_equal(residuals(several, arm_space, X[0], [2.0, 0.5]), vectors[:1])
+    fixed = arm_space.with_fixed("k", X[0, 1])
+    np.testing.assert_array_equal(residuals(several, fixed, X[0, [0, 2, 3]], [2.0, 0.5]), vectors[:1])
+
+
+@pytest.mark.parametrize("name", FITNESS)
+def test_its_sum_of_squares_is_the_fitness(several, arm_space, X, name):
+    fitness = FITNESS[name]
+    problem = IdentificationProblem(arm_space, several, fitness)
+    if fitness.weigh is None:
+        with pytest.raises(ArmidError, match=f"'{name}' is not a sum of squares, least squares expects rmse or like"):
+            problem.evaluated(X, True)
+        return
+    values, vectors = problem.evaluated(X, True)
+    total = (vectors**2).sum(axis=1)
+    expected = {"rmse": np.sqrt(total / vectors.shape[1]), "likelihood": total}[name]
+    np.testing.assert_allclose(values, expected, rtol=1e-12)
+    np.testing.assert_array_equal(values, problem.value(X))
+
+
+def test_pymoo_s_evaluator_gets_it_when_it_asks(several, arm_space, X):
+    meter = Meter(3)
+    problem = IdentificationProblem(arm_space, several, FITNESS["rmse"], meter)
+    pop = Evaluator(evaluate_values_of=ASKED).eval(problem, Population.new(X=X))
+    vectors = pop.get(RESIDUALS)
+    assert meter.used == 3
+    np.testing.assert_array_equal(vectors[:3], residuals(several, arm_space, X[:3], [1.0, 1.0]))
+    assert np.isnan(vectors[3:].astype(float)).all()
+    plain = Evaluator().eval(IdentificationProblem(arm_space, several, FITNESS["rmse"]), Population.new(X=X))
+    assert RESIDUALS not in plain[0].data
+    np.testing.assert_array_equal(plain.get("F")[:3], pop.get("F")[:3])

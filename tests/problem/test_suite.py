@@ -1,5 +1,6 @@
 """The suite: reproducible from name and version, exact optima, several objectives, and what is hard about it."""
 
+import hashlib
 import os
 import subprocess
 import sys
@@ -12,24 +13,22 @@ import armid
 from armid.errors import ArmidError
 from armid.problem.suite import CLASSES_OF_FORMS, DEFINITIONS
 
-# Values of version 1 at a point each: u_j = frac(i sqrt(j + 2)), i from 1 in this order.
+# Problem of version 1 -> i and the value at the point u_j = frac(i sqrt(j + 2)).
 STORED = {
-    "arm/1": 0.13404600046558043, "arm/15": 0.2675166514234411, "arm_noisy/2": 0.10788614908986356,
-    "arm_similarity/3": 0.14730023937865555, "arm_shape/6": 0.1857142857142857,
-    "arm_similarity_noisy/4": 0.02294472544182413, "arm_short/5": 0.3286182717919192, "arm_four/6": 0.09678005082351138,
-    "friction/7": 0.06476747340794244, "friction_similarity/8": 0.024362695031477144, "ripple/9": 0.27585627822400144,
-    "sticking/10": 0.38000634195995114, "sticking_similarity/11": 0.4634497329162959,
-    "supply_four/12": 0.3153829701825484, "lags_similarity/13": 0.04956412520446862, "rocking/14": 0.21292109364899267,
-    "rocking_friction/1": 0.38986471225039465, "balance/2": 0.5327874113927603, "sensor/3": 0.29775036626370865,
-    "whole_similarity/6": 0.3854988502694925,
+    "arm/1": (1, 0.13404600046558043), "arm/15": (2, 0.2675166514234411), "arm_noisy/2": (3, 0.10788614908986356),
+    "arm_similarity/3": (4, 0.14730023937865555), "arm_shape/6": (5, 0.1857142857142857),
+    "arm_similarity_noisy/4": (6, 0.02294472544182413), "arm_short/5": (7, 0.3286182717919192),
+    "arm_four/6": (8, 0.09678005082351138), "friction/7": (9, 0.06476747340794244),
+    "friction_similarity/8": (10, 0.024362695031477144), "sticking/10": (12, 0.38000634195995114),
+    "sticking_similarity/11": (13, 0.4634497329162959), "lags_similarity/13": (15, 0.04956412520446862),
+    "rocking_friction/1": (17, 0.38986471225039465), "whole_similarity/6": (20, 0.3854988502694925),
 }  # fmt: skip
 OF_THE_ARM = [name for name in STORED if name.startswith("arm")]
 
 
 def is_as_stored(name):
-    problem = armid.suite()[name]
-    point = ((1 + list(STORED).index(name)) * np.sqrt(np.arange(2, 2 + problem.n_var))) % 1.0
-    return problem(point) == pytest.approx(STORED[name], rel=1e-7)
+    problem, (i, value) = armid.suite()[name], STORED[name]
+    return problem((i * np.sqrt(np.arange(2, 2 + problem.n_var))) % 1.0) == pytest.approx(value, rel=1e-7)
 
 
 def test_values_at_stored_points():
@@ -38,9 +37,19 @@ def test_values_at_stored_points():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [name for name in STORED if name not in OF_THE_ARM])
-def test_values_at_stored_points_of_every_machine(name):
+def test_values_at_stored_points_of_other_machines(name):
     """Nearly each compiles a model of its own, which two processes may share out."""
     assert is_as_stored(name)
+
+
+def test_every_problem_is_what_version_1_declares():
+    """Names, boxes, records, fitness and drawn truths, to nine digits."""
+    lines = []
+    for problem in armid.suite(units="SI"):
+        given, numbers = problem.definition, (*problem.xl, *problem.xu, *problem.truth)
+        kept = (*sorted(given.free), given.fitness, given.strokes, given.duration_s, given.noise_deg_s)
+        lines.append(repr((problem.name, *problem.names, *(f"{x:.9g}" for x in numbers), *kept)))
+    assert hashlib.sha256("\n".join(lines).encode()).hexdigest()[:16] == "d012508c95671a16"
 
 
 def test_the_suite_is_a_lazy_sequence():

@@ -156,13 +156,6 @@ def test_its_scales_stay_and_an_optional_input_has_its_default(write, axis_colum
     np.testing.assert_array_equal(read(write(SERVO_TOML, move=off)).records[0].manoeuvre.inputs["fan"], 0.0)
 
 
-def test_constants_of_a_record(write, axis_columns):
-    toml = SERVO_TOML + '[records.constants]\nkp = 7.0\n[[records]]\nfile = "again.csv"\nrole = "holdout"\n'
-    records = read(write(toml, move=axis_columns, again=axis_columns)).records
-    assert [r.constants.get("kp") for r in records] == [7.0, None]
-    assert records[0].pieces[0].manoeuvre.constants["kp"] == 7.0
-
-
 def test_a_start_position_needs_a_column(write, axis_columns):
     columns = {name: values for name, values in axis_columns.items() if name != "position_m"}
     with pytest.raises(ArmidError, match=r"campaign/move\.csv, line 1: .*'servo' declares it: a column position_m"):

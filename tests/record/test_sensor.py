@@ -1,9 +1,20 @@
-"""Of the values of a column alone: step and hold of its sensor, and samples that are no data."""
+"""Of the values of a column alone: step and hold of its sensor, samples that are no data, noise with a known answer."""
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
-from armid.record.sensor import Sensor, after_sudden, renewed, repeated_samples, sensor_of, wild_samples
+from armid.record.sensor import (
+    Sensor,
+    after_sudden,
+    difference_rms,
+    noise_of,
+    renewed,
+    repeated_samples,
+    rest_between,
+    sensor_of,
+    wild_samples,
+)
 
 N = 4000
 TIMES = 1e-3 * np.arange(N)
@@ -112,3 +123,120 @@ def test_equal_values_of_a_coarse_encoder_are_no_fault_and_a_frozen_one_is(noise
         assert not repeated_samples(values, rms, True, Sensor(step=1.0), sudden)["stuck"].any()
     values[1000:1100] = values[1000]
     assert repeated_samples(values, rms, True, Sensor(step=1.0), sudden)["stuck"].sum() >= 100
+
+
+INTERVAL = 0.001
+MOTION = np.sin(3 * np.arange(2000) * INTERVAL) * 2.5
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(7)
+
+
+def test_white_rest(rng):
+    noise = noise_of(0.02 + rng.normal(0, 0.005, 20_000), MOTION, INTERVAL)
+    assert noise.source == "rest"
+    assert noise.n_samples == 20_000
+    assert noise.mean == pytest.approx(0.02, abs=2e-4)
+    assert noise.rms == pytest.approx(0.005, rel=0.03)
+    assert noise.effective_fraction > 0.95
+    assert noise.correlation_time_s < 0.2 * INTERVAL
+
+
+def test_short_white_rest_stays_white(rng):
+    fractions = [noise_of(rng.normal(0, 1, 100), MOTION, INTERVAL).effective_fraction for _ in range(200)]
+    assert np.median(fractions) == 1.0
+    alternating = np.diff(rng.normal(0, 1, 20_001))
+    assert noise_of(alternating, MOTION, INTERVAL).effective_fraction == 1.0
+
+
+def test_a_sensor_that_is_stuck_tells_nothing_of_its_noise(rng):
+    signal = np.round((MOTION + rng.normal(0, 0.01, MOTION.size)) / 0.002) * 0.002
+    stuck = signal.copy()
+    stuck[500:1300] = stuck[500]
+    assert difference_rms(stuck) == pytest.approx(difference_rms(signal), rel=0.1)
+    assert difference_rms(MOTION) < 1e-12
+    # a quiet sensor of coarse steps repeats itself, and is not stuck: its noise is that of its steps
+    coarse = np.round(MOTION / 0.05) * 0.05
+    assert difference_rms(coarse) < 0.01
+    assert noise_of(np.zeros(0), coarse, INTERVAL).rms >= 0.05 / np.sqrt(12) * (1 - 1e-9)
+
+
+@pytest.mark.parametrize("time_constant", [0.002, 0.01])
+def test_coloured_rest(rng, time_constant):
+    phi = np.exp(-INTERVAL / time_constant)
+    rest = lfilter([0.005 * np.sqrt(1 - phi**2)], [1, -phi], rng.normal(size=100_000))
+    noise = noise_of(rest, MOTION, INTERVAL)
+    assert noise.rms == pytest.approx(0.005, rel=0.05)
+    assert noise.correlation_time_s == pytest.approx(time_constant, rel=0.1)
+    assert noise.effective_fraction == pytest.approx((1 - phi) / (1 + phi), rel=0.1)
+
+
+def test_a_silent_rest_has_the_noise_of_the_steps_of_the_signal():
+    for level in (0.0, 0.1):
+        noise = noise_of(np.full(100, level), MOTION, INTERVAL)
+        assert (noise.correlation_time_s, noise.effective_fraction) == (0.0, 1.0)
+        # the rounding of the largest value is left
+        assert 0.0 < noise.rms < 1e-15
+        assert noise.mean == pytest.approx(level)
+    noise = noise_of(np.zeros(100), np.round(MOTION, 2), INTERVAL)
+    assert noise.rms == pytest.approx(0.01 / np.sqrt(12))
+
+
+@pytest.mark.parametrize("n_rest", [0, 49, 100])
+def test_few_rest_samples_or_such_as_read_one_value_leave_the_differences(rng, n_rest):
+    noise = noise_of(np.zeros(n_rest), MOTION + rng.normal(0, 0.005, MOTION.size), INTERVAL)
+    assert (noise.source, noise.n_samples) == ("differences", MOTION.size)
+    assert n_rest == 100 or noise.mean is None
+    assert noise.rms == pytest.approx(0.005, rel=0.1)
+
+
+def test_differences_keep_transients_out(rng):
+    jerky = MOTION + np.where(np.arange(2000) % 400 < 60, np.sin(np.arange(2000)), 0.0)
+    assert difference_rms(jerky + rng.normal(0, 0.005, 2000)) == pytest.approx(0.005, rel=0.3)
+
+
+def test_a_rest_between_motions_tells_the_noise_where_the_input_is_still_too(rng):
+    still = np.zeros(3000, dtype=bool)
+    still[1000:1800] = True
+    speed = np.where(still, 0.0, 3.0 * np.sin(np.arange(3000) / 40.0))
+    # the machine runs down first
+    speed[1000:1200] = 2.0 * np.exp(-np.arange(200) / 20.0)
+    measured = speed + rng.normal(0.02, 0.005, 3000)
+    rest = rest_between(measured, still, True)
+    assert rest.size >= 200
+    assert np.std(rest) == pytest.approx(0.005, rel=0.2)
+    noise = noise_of(rest, measured, INTERVAL)
+    assert (noise.source, noise.mean) == ("rest", pytest.approx(0.02, abs=2e-3))
+    # under drive a stick is not a rest, an even speed is not a standstill, and a still input does not hold a machine
+    assert rest_between(measured, np.zeros(3000, dtype=bool), True).size == 0
+    assert rest_between(measured + 1.0, still, True).size == 0
+    assert rest_between(3.0 * np.sin(np.arange(3000) / 40.0), still, True).size == 0
+    assert rest_between(measured + 1.0, still, False).size >= 200
+
+
+def test_a_machine_that_swings_freely_is_not_at_rest(rng):
+    time = np.arange(1600) / 200.0
+    still, noise = np.ones(time.size, dtype=bool), rng.normal(0, 0.001, time.size)
+    for period, memory in ((1.2, 20.0), (1.2, 1e9), (0.1, 0.5), (0.05, 5.0), (7.0, 30.0)):
+        swing = np.exp(-time / memory) * np.sin(2 * np.pi * time / period) + noise
+        assert rest_between(swing, still, is_speed=False).size < time.size
+        assert rest_between(swing[:100], still[:100], is_speed=False).size == 0
+    # one that has come to rest tells the noise then
+    tail = rest_between(np.exp(-time / 0.1) * np.sin(2 * np.pi * time / 0.5) + noise, still, is_speed=False)
+    assert tail.size in (400, 800)
+    assert np.std(tail) == pytest.approx(0.001, rel=0.1)
+    # noise of a filtered sensor is a rest, in nearly all of 200
+    coloured = lfilter([1.0], [1.0, -0.8], rng.normal(0, 1, (200, 1000)))
+    kept = [rest_between(one, still[:1000], is_speed=False).size == 1000 for one in coloured]
+    assert np.mean(kept) > 0.97
+
+
+def test_a_coarse_sensor_tells_its_noise_by_the_motion_where_its_step_hides_it_at_rest(rng):
+    motion = 30.0 * MOTION + 8.0 * np.sin(9 * np.arange(MOTION.size) / 200.0)
+    for own in (0.3, 0.4, 0.5):
+        rests = np.round(rng.uniform(-0.5, 0.5, (20, 1)) + rng.normal(0, own, (20, 150)))
+        moved = np.round(motion + rng.normal(0, own, (20, motion.size)))
+        sized = [noise_of(rest, one, INTERVAL).rms for rest, one in zip(rests, moved, strict=True)]
+        assert np.array(sized) == pytest.approx(np.sqrt(own**2 + 1 / 12), rel=0.13)

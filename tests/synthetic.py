@@ -1,0 +1,34 @@
+"""SYNTHETIC campaigns: motions by steps of their own, no line of the engine in them, and the text that names files."""
+
+from collections.abc import Callable, Mapping
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from armid.record import write_campaign
+
+Array = NDArray[np.float64]
+
+
+def moved(rates: Callable[..., Array], drive: Array, interval: float, start: Array | tuple[float, ...],
+          hold: str = "linear", substeps: int = 1) -> Array:  # fmt: skip
+    """Return the states at the samples, (n_samples, n_states), of dx/dt = rates(x, drive), by Runge-Kutta steps."""
+    states, h = [np.asarray(start, dtype=float)], interval / substeps
+    for now, after in pairwise(drive):
+        x, rise = states[-1], (after - now) / substeps if hold == "linear" else 0.0
+        for u in now + rise * np.arange(substeps):
+            k1 = rates(x, u)
+            k2 = rates(x + 0.5 * h * k1, u + 0.5 * rise)
+            k3 = rates(x + 0.5 * h * k2, u + 0.5 * rise)
+            x = x + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + rates(x + h * k3, u + rise))
+        states.append(x)
+    return np.array(states)
+
+
+def write_records(folder: Path, head: str, tables: Mapping[str, Mapping[str, Array]], holdout: int = 1) -> Path:
+    """Write a campaign of some files, the last of them held out; return its folder."""
+    roles = ["train"] * (len(tables) - holdout) + ["holdout"] * holdout
+    entries = [f'[[records]]\nfile = "{file}"\nrole = "{role}"\n' for file, role in zip(tables, roles, strict=True)]
+    return write_campaign(folder, head + "".join(entries), tables)
