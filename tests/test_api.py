@@ -252,6 +252,7 @@ def test_a_folder_whose_name_is_no_utf_8(found, tmp_path, run):
 
 @pytest.mark.parametrize(("call", "said"), [
     (lambda a: armid.identify(a, fitness=3), "3"),
+    (lambda a: armid.identify(a, identifier=3), "is 3, expected"),
     (lambda a: armid.close_loop(a, without=["viscos"]), "^without: effect 'viscos' is not known"),
     (lambda a: armid.close_loop(armid.Model(PLANTS["driven_axis"])), "a Model and its campaign"),
     (lambda a: armid.simulate(armid.Model(PLANTS["driven_axis"])), "a manoeuvre and a population are expected"),
@@ -263,6 +264,7 @@ def test_a_folder_whose_name_is_no_utf_8(found, tmp_path, run):
     (lambda a: armid.identify(a, bounds={"inertia": 3}), r"name -> \(low, high\) is expected"),
     (lambda a: armid.identify(a, fix={"inertia": "x"}), "name -> value is expected"),
     (lambda a: armid.identify(a, seed="x"), "the seed is 'x'"),
+    (lambda a: armid.identify(a, target="x"), "the target is 'x'"),
     (lambda a: armid.identify(3), "the campaign is a int"),
     (lambda a: armid.identify(pd.DataFrame({"time_s": [0.0]})), "needs its plant"),
     (lambda a: armid.identify(pd.DataFrame({"time_s": [0.0]}), plant="axis"), "axis"),

@@ -9,7 +9,7 @@ import pytest
 
 from armid.contract.trials import PlainModel
 from armid.errors import ArmidError
-from armid.model import EFFECTS, PLANTS, Effect, Manoeuvre, Model, Output, Parameter, State
+from armid.model import EFFECTS, PLANTS, Constant, Effect, Manoeuvre, Model, Output, Parameter, State
 from armid.model.plants.shell_transfer_arm import gravity_level, gravity_moment
 
 ARM, AXIS = PLANTS["shell_transfer_arm"], PLANTS["driven_axis"]
@@ -149,6 +149,8 @@ DECLARED = {
                     "effect 'e' declares 'level' twice: each name once is expected"),
     "reserved": (lambda: Effect("rate", LEVEL, {"torque": zero}), "effect 'rate' cannot have this name: rate"),
     "effect's name": (lambda: Effect("my effect", LEVEL, {"torque": zero}), "effect 'my effect' is not a usable name"),
+    "constant twice": (lambda: replace(AXIS, constants=(*AXIS.constants, Constant("v", 1.0, "1"))),
+                       "plant 'driven_axis' declares 'v' twice"),
     "output": (lambda: replace(AXIS, output="recorded_sped"), "plant 'driven_axis' records 'recorded_sped': did you"),
     "signal is an alias": (lambda: replace(AXIS, outputs=(Output("s", "omega", "m/s"),), output="", output_unit=""),
                            "plant 'driven_axis' records 'omega', another name for 'v': 'v' is expected"),

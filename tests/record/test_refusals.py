@@ -91,6 +91,7 @@ TOML = {
     "missing file key": (GOOD.replace("file =", "# file ="), ["campaign.toml, record 1", "'file'", "missing"]),
     "unknown role": (GOOD.replace('"train"', '"test"'), ["'role' is 'test'", "'train' or 'holdout'"]),
     "no train record": (GOOD.replace('"train"', '"holdout"'), ["campaign.toml", "'train'", "at least one"]),
+    "no word of the shell": (GOOD.replace("shell = true", ""), ["'shell' is missing", "true or false"]),
     "text for a boolean": (GOOD.replace("shell = true", 'shell = "yes"'), ["'shell' is 'yes'", "true or false"]),
     "endless integer": (GOOD.replace("28.0", "9" * 5000), ["campaign.toml", "TOML"]),
     "endless hexadecimal": (GOOD.replace("28.0", "0x" + "f" * 9000), ["'supply_V'", "too many digits"]),
