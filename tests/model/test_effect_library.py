@@ -74,7 +74,7 @@ def test_each_is_documented_and_can_be_simulated_at_its_defaults(effect):
     assert any(p.null == 0.0 and p.fixed is None for p in effect.parameters)
     # Only widths of smoothed kinks and departures from the usual form are fixed.
     rest = {p.name: p.fixed for p in effect.parameters if p.fixed is not None and p.name not in ("width", "least")}
-    assert rest.items() <= {"exponent": 2.0}.items() | dict.fromkeys(
+    assert rest.items() <= {"exponent": 2.0, "knee": 2.0}.items() | dict.fromkeys(
         ("hardening", "cooling", "period", "damping", "second"), 0.0).items()  # fmt: skip
 
 

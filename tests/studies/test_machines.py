@@ -69,6 +69,10 @@ LISTED = (
      {"level": 0.05, "way": 0.01, "width": WIDTH * 0.6}),
     ("elastic_joint", "backlash", "coupling", {"gap": 0.03}, "backlash", {"width": 0.03}),
     ("cart", "saturation", "hard", {"sharpness": 0.4}, "drive_saturation:hard", {"sharpness": 0.4}),
+    ("cart", "saturation", "rational", {"sharpness": 0.4}, "drive_saturation:rapp", {"sharpness": 0.4, "knee": 1.0}),
+    ("motor_disc", "dry_friction", "hess_soom", {"level": 0.1, "excess": 0.5, "fade": 10.0},
+     "coulomb+stribeck:hess_soom", {"coulomb.level": 0.1, "coulomb.width": WIDTH * 100.0, "stribeck.level": 0.05,
+                                    "stribeck.fade": 10.0, "stribeck.width": WIDTH * 100.0}),
     # one way alone is both ways less, and a difference
     ("motor_disc", "asymmetry", "gain", {"share": 0.2}, "drive_asymmetry+drive_gain",
      {"drive_asymmetry.difference": -0.1, "drive_gain.error": -0.1}),

@@ -129,8 +129,28 @@ hard = Effect(
     parameters=(Parameter("sharpness", "1/effort", 0.0, 4.0, null=0.0, note="1/E_s, E_s the most that is given"),),
     note="the drive gives no more than a limit", source="Tao and Kokotovic 1994, IEEE Trans. Automatic Control 39(1)",
 )  # fmt: skip
+
+
+def bend_loss(drive_effort, sharpness, knee):
+    """Effort lost, -E (1 - (1 + x^knee)^(-1/knee)) with x = sharpness abs(E): the knee bends the sharper, the larger.
+
+    A knee of 1 is the rational form, 2.5 close to tanh, and a large one the hard limit.
+    """
+    x = sharpness * np.abs(drive_effort)
+    return -drive_effort * (1 - (1 + x**knee) ** (-1 / knee))
+
+
+rapp = Effect(
+    name="drive_saturation", form="rapp", adds={"drive": bend_loss},
+    parameters=(
+        Parameter("sharpness", "1/effort", 0.0, 4.0, null=0.0, note="1/E_s, E_s the most that is given"),
+        Parameter("knee", "1", 1.0, 8.0, fixed=2.0, note="how sharply the answer bends at the limit"),
+    ),
+    note="the drive comes close to a limit along a bend",
+    source="Rapp 1991, Proc. 2nd European Conference on Satellite Communications (soft limiter)",
+)  # fmt: skip
 drive_saturation = Effect(
-    name="drive_saturation", form="rational", forms=(hard,), adds={"drive": saturation_loss},
+    name="drive_saturation", form="rational", forms=(hard, rapp), adds={"drive": saturation_loss},
     parameters=(Parameter("sharpness", "1/effort", 0.0, 1.0, null=0.0, note="1/E_s, E_s the effort that saturates"),),
     note="the drive gives less per command the more it gives",
     source="Krishnan, Permanent Magnet Synchronous and Brushless DC Motor Drives, doi:10.1201/9781420014235",

@@ -29,8 +29,22 @@ def stribeck_torque(omega, level, fade, exponent, width):
     return -level * np.exp(-(((omega / fade) ** 2) ** (0.5 * exponent))) * omega / np.sqrt(omega**2 + width**2)
 
 
+def hess_soom_torque(omega, level, fade, width):
+    """Effort of the excess, -level / (1 + (omega/fade)^2) sign(omega), the sign smoothed over width."""
+    return -level / (1 + (omega / fade) ** 2) * omega / np.sqrt(omega**2 + width**2)
+
+
+hess_soom = Effect(
+    name="stribeck", form="hess_soom", adds={"torque": hess_soom_torque},
+    parameters=(
+        Parameter("level", "effort", 0.0, 0.5, null=0.0, note="excess of friction at rest over friction in motion"),
+        Parameter("fade", "speed", 0.02, 0.5, nominal=0.08, note="speed at which half of the excess has faded"),
+        SIGN_WIDTH,
+    ),
+    note="friction that is higher at low speed, and fades slowly", source="Hess, Soom 1990, doi:10.1115/1.2920240",
+)  # fmt: skip
 stribeck = Effect(
-    name="stribeck", adds={"torque": stribeck_torque},
+    name="stribeck", forms=(hess_soom,), form="exponential", adds={"torque": stribeck_torque},
     parameters=(
         Parameter("level", "effort", 0.0, 0.5, null=0.0, note="excess of friction at rest over friction in motion"),
         Parameter("fade", "speed", 0.02, 0.5, nominal=0.08, note="speed at which the excess has faded to 1/e"),
