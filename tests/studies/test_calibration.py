@@ -1,10 +1,12 @@
 """The study of probabilities and intervals: its order, its truth, and its scores on answers that are made up."""
 
 from collections import Counter
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from armid.inference.evidence import SCALES_OF_STRENGTH, Scale
 from calibration.campaigns import ARM, HIDDEN, MACHINE, tasks
 from calibration.scores import Closed, Score, calibration_error, interval_score, median, ratio_of, reliability, score
 from calibration.truth import all_found, truth_of
@@ -74,3 +76,26 @@ def test_a_target_is_met_where_the_interval_touches_it():
     assert Score("S2", "made up", "arm", 20, 0.5, 0.4, 0.6).met is None
     # all alike: the rule of three
     assert score("S2", "made up", "arm", [[True]] * 30, lambda one: one).low == pytest.approx(0.9)
+
+
+@pytest.mark.slow
+def test_nested_sampling_finds_the_evidence_of_a_linear_model():
+    nested = pytest.importorskip("calibration.nested", exc_type=ImportError)
+    rng, at = np.random.default_rng(2), np.array([0.4, 0.6])
+    jacobian, left = rng.normal(size=(60, 2)) * 20.0, rng.normal(size=60)
+    left -= jacobian @ np.linalg.lstsq(jacobian, left, rcond=None)[0]
+    space = SimpleNamespace(low=np.zeros(2), high=np.ones(2), free=np.ones(2, dtype=bool))
+    records = SimpleNamespace(
+        space=space, span=np.ones(2), rows=(np.empty(0, dtype=np.int64), np.empty(0), np.empty(0)),
+        residuals=lambda Z: left - (Z - at) @ jacobian.T, data=SimpleNamespace(log_cover=0.0),
+    )  # fmt: skip
+    model = SimpleNamespace(parameters=dict.fromkeys("ab"))
+    fit = SimpleNamespace(records=records, values={"a": 0.4, "b": 0.6}, model=model)
+    about = SimpleNamespace(fit=fit, library=SimpleNamespace(owner=lambda _: None))
+    log_z, error, _ = nested.nested(about, Scale(60, 1.0, 1e9))
+    _, determinant = np.linalg.slogdet(jacobian.T @ jacobian / (2.0 * np.pi))
+    assert error < 0.6
+    assert log_z == pytest.approx(-0.5 * (left @ left - 60) - 0.5 * determinant, abs=3.0 * error)
+    # half-normal with one of several scales
+    drawn = nested.strength(0.0, 1.0, True)((np.arange(20_000) + 0.5) / 20_000)
+    assert np.mean(drawn) == pytest.approx(np.mean(SCALES_OF_STRENGTH) * np.sqrt(2.0 / np.pi), rel=1e-3)
