@@ -19,6 +19,8 @@ from armid.record.start import state_shown, track_of
 
 # Pieces into which each piece of a record is cut, a power of two, and samples that one must have.
 MOST_PARTS, FEWEST_OF_PART = 16, 100
+# Samples of all records that are looked at in short pieces: of more than these only some pieces of each record are.
+SAMPLES_IN_PIECES = 5_000
 # File and sample of the record at which a piece begins -> the constants of its start, SI.
 Starts = Mapping[tuple[str, int], Mapping[str, float]]
 
@@ -31,7 +33,8 @@ def on_short_pieces(library: Library, declared: Fit) -> tuple[Library, Fit] | No
     n_parts = parts_of(library)
     if n_parts == 1:
         return None
-    short = cut_library(library, n_parts, {})
+    n_samples = sum(sum(n) for n in library.data.lengths)
+    short = cut_library(library, n_parts, {}, min(-(-n_samples // SAMPLES_IN_PIECES), n_parts))
     return short, accurate(fit_from(short.problem((), declared.values), (), [declared.z]), short)
 
 
@@ -60,23 +63,29 @@ def parts_of(library: Library) -> int:
     return n_parts
 
 
-def cut_library(library: Library, n_parts: int, starts: Starts) -> Library:
+def cut_library(library: Library, n_parts: int, starts: Starts, every: int = 1) -> Library:
     """Return the library with the same records in parts, whose starts are those that are known.
 
-    Parts take their inputs as read; the whole records are those of the library.
+    Parts take their inputs as read; the whole records are those of the library. every: 2 keeps each second part, from
+    one record to the next another one.
     """
     plant, data = library.declared.plant, library.data
     if n_parts > 1:
         data = library.as_read or data
-        data = replace(data, records=tuple(cut(record, n_parts, plant) for record in data.records))
+        data = replace(
+            data, records=tuple(cut(r, n_parts, plant, i % every, every) for i, r in enumerate(data.records))
+        )
         data = data.with_levels(data.levels)
     records = tuple(restarted(record, starts) for record in data.records)
     as_read = library.as_read if n_parts == 1 else None
     return replace(library.with_data(replace(data, records=records), as_read), _schedules={})
 
 
-def cut(record: Record, n_parts: int, plant: Plant) -> Record:
-    """Return the record with each of its pieces cut into parts that start anew, without what no window holds."""
+def cut(record: Record, n_parts: int, plant: Plant, first_part: int, every: int) -> Record:
+    """Return the record with each of its pieces cut into parts that start anew, without what no window holds.
+
+    Of the parts the first that is kept and each that follows it by so many.
+    """
     asked = plant.start_constants.values()
     given = {name: value for name, value in record.constants.items() if name not in asked}
     tracks = {signal.output: track_of(signal) for signal in record.signals}
@@ -84,7 +93,7 @@ def cut(record: Record, n_parts: int, plant: Plant) -> Record:
     for piece in record.pieces:
         first, length = piece.start_index + piece.window.start, piece.window.stop - piece.window.start
         edges = [first + length * i // n_parts for i in range(n_parts + 1)]
-        for a, b in pairwise(edges):
+        for a, b in list(pairwise(edges))[first_part::every]:
             state, deviations = state_shown(plant, given, tracks, whole.interval, a)
             pieces.append(Piece(whole.part(a, b - a, state), slice(0, b - a), a, deviations, shown_start=state))
     return replace(record, pieces=tuple(pieces), whole_pieces=tuple(pieces))
