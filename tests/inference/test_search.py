@@ -79,6 +79,18 @@ def test_a_fault_that_an_effect_makes_needless_is_dropped(explored, monkeypatch)
 
 
 @pytest.mark.slow
+def test_the_model_at_which_the_search_ends_is_expanded(explored, monkeypatch):
+    """Else its name may stand for a twin that was never fitted in its place."""
+    for name in ("MOST_EXPANDED", "FEWEST_EXPANDED"):
+        monkeypatch.setattr(search, name, 1)
+    found = explored(["coulomb", "stribeck", "supply_sag"], "coulomb=40").exploration
+    best, _ = found.ranked()[0]
+    assert {h.name for h in best} == {"coulomb"}
+    assert set(found.forecasts) == {frozenset(), best}
+    assert {"stribeck"} in [{h.name for h in model} for model in found.fits]
+
+
+@pytest.mark.slow
 def test_a_model_that_missed_its_valley_is_fitted_again_from_the_larger_one(explored):
     """Else a second name, of no size, would seem as necessary as the first."""
     found = explored(["coulomb", "supply_sag"], "coulomb=40").exploration

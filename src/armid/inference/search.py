@@ -47,6 +47,8 @@ N_LEADING, MOST_EXPANDED, MOST_EFFECTS = 24, 16, 8
 SAMPLES, USUAL_CONSTANTS, FEWEST_EXPANDED = 4_000, 10, 8
 # Far from the noise: models that are expanded in turn without a better one, after which what is missing has no name.
 MOST_IN_VAIN = 4
+# Models that are expanded once more where the search ends at one that is not.
+MOST_ENDS = 3
 # A model is brought to its estimate at most so often in turn.
 MOST_COMPLETED = 4
 # Mean square of the best model, in units of the noise, up to which rivals are begun afresh.
@@ -143,6 +145,13 @@ def explore(library: Library, declared: Fit, most: int | None = None) -> Explora
         expand_all(exploration, most)
     add_unknown(exploration)
     finish_all(exploration)
+    for _ in range(MOST_ENDS):
+        best = exploration.ranked()[0][0]
+        if best in exploration.forecasts or exploration.fits[best].records.data.cover is not None:
+            break
+        # Drops from larger models led here: what may replace its effects was never fitted.
+        expand(exploration, best)
+        finish_all(exploration)
     return exploration
 
 
