@@ -6,7 +6,7 @@
     python studies/calibration/nested.py FOLDER --seed 8002 --campaigns 20 --out results/nested    evidence, two ways
     python studies/calibration/score.py FOLDER --out results/calibration       the scores, with their intervals
 
-The seed of the run that judges is named in a commit before it: 716, of 150 campaigns a family. All campaigns are
+The seed of the run that judges is named in a commit before it: 717, of 150 campaigns a family. All campaigns are
 synthetic. Two simulators that share no code with armid make them: `studies/stand` an arm, `studies/machines` eight
 other machines. Read `campaigns`, `run`, `former`, `truth`, `scores`, `score`, `fit`, `nested`.
 """
