@@ -53,7 +53,7 @@ def test_files_of_a_spreadsheet_become_a_campaign_that_checks(run, refused, tmp_
     assert (sheet["plant"], sheet["hold"], sheet["unwrap"]) == ("rotary_arm", "zero", True)
     assert [(r["file"], r["role"]) for r in sheet["records"]] == [("first.csv", "train"), ("second.csv", "holdout")]
     told = ("time_s: the column 'Zeit [ms]'", "drive_V: the column 'Motor voltage [V]'", 'role = "holdout"  # GUESS',
-            "2000 rows at 250 Hz")  # fmt: skip
+            "2000 rows at 250 Hz, 1.01 s of rest first; angular_velocity_rpm: steps of 0.01")  # fmt: skip
     for words in told:
         assert words in text, text
     times, drive, speed, _ = wheel(1)

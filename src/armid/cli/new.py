@@ -23,6 +23,7 @@ from armid.errors import ArmidError, nearest, quoted
 from armid.model import Array
 from armid.model.effect import RESERVED_WORDS
 from armid.model.parameter import check_name
+from armid.record.sensor import FEWEST_REST_SAMPLES, sensor_of, stands_still
 from armid.record.signal import wraps_at
 from armid.record.table import CsvTable, read_table
 from armid.registry import load_registry
@@ -73,8 +74,8 @@ def new_command(kind: str, name: str, style: str, files: tuple[Path, ...], out: 
     An effect, a fitness, an identifier, a plant or an analysis becomes FOLDER/NAME.py, a Python file that declares
     NAME. `armid check` tries it, `armid report` an analysis. A study becomes FOLDER/NAME.toml, which `armid study`
     runs. A campaign becomes the folder FOLDER/NAME with campaign.toml and two small records, which are synthetic and
-    say so; with --from FILE... it has copies of the columns that it uses, and a comment at each guess. Nothing that
-    exists is overwritten.
+    say so; with --from FILE... it has copies of your records, and a comment at each guess. Nothing that exists is
+    overwritten.
     """
     from armid.record import write_campaign
 
@@ -219,6 +220,8 @@ DRIVEN_IN = {"mV": ("V", 1e-3), "kV": ("V", 1e3), "mA": ("A", 1e-3), "kN": ("N",
 LINEAR, DRIVES = {*SUFFIXES["m"], *SUFFIXES["m/s"], "N"}, {"V", "A", "N", "N_m"}
 COUNT_ENDS = ("counts", "counts_s")
 TURNING_ENDS = {*SUFFIXES["rad/s"], *SUFFIXES["rad"]}
+# A machine is at rest as long as its signal is nearer to its first rows than so many times their range.
+BEYOND_REST = 2.5
 # Share of equal neighbours from which on an input keeps its value between samples.
 KEPT = 0.5
 # Of a machine that turns or is linear: its lines of campaign.toml.
@@ -380,7 +383,7 @@ def seconds_of(column: Column, table: CsvTable, notes: list[str]) -> float:
 def rewritten(
     table: CsvTable, renamed: Mapping[str, str], time: str, second: float, drive: tuple[str, float]
 ) -> dict[str, Array]:
-    """Return the columns that are used under the headers of a record; numbers are kept where the unit is.
+    """Return the columns of a file under the headers of a record; numbers are kept where the unit is.
 
     drive: its header, and what its numbers are multiplied by.
     """
@@ -390,8 +393,12 @@ def rewritten(
                              "machine with the same columns are expected")  # fmt: skip
         table.numbers(header, gaps=header != time)
     times = table.columns[time] if second == 1.0 else np.round(table.columns[time] * second, 12)
+    taken = {"time_s", *renamed.values()}
+    # an encoder that is not used must not be taken for an output, which wants the counts of a turn
+    kept = {h: f"unused_{h}" if column_of(h).end in COUNT_ENDS else h for h in table.columns
+            if h not in (time, *renamed) and h not in taken and "," not in h}  # fmt: skip
     own = {new: table.columns[h] * (drive[1] if new == drive[0] else 1.0) for h, new in renamed.items()}
-    return {"time_s": times} | own
+    return {"time_s": times} | own | {new: table.columns[h] for h, new in kept.items()}
 
 
 def guessed_text(
@@ -404,17 +411,32 @@ def guessed_text(
     stays = f"keeps its value from row to row in {held.count(True)} of {len(held)} files"
     kept = ("zero", stays) if any(held) else ("linear", "changes in each row")
     lines = [
-        "# Written by `armid new campaign --from`: check each line with GUESS. The CSV files are copies of the columns",
-        "# that are used, with headers that armid reads, numbers as in the originals but where a line says so, and",
-        "# times in seconds.", "#", *(f"# {note}" for note in notes), f'name = "{name}"', *GUESSED_MODELS[linear],
+        "# Written by `armid new campaign --from`: check each line with GUESS. The CSV files are copies with",
+        "# headers that armid reads. Numbers are those of the originals unless a line says so, times are in",
+        "# seconds.", "#", *(f"# {note}" for note in notes), f'name = "{name}"', *GUESSED_MODELS[linear],
         f'hold = "{kept[0]}"  # GUESS: the drive {kept[1]}',
     ]  # fmt: skip
     wrapped = [new for old, new in renamed.items() for t in tables if wraps_at(t.columns[old], new)]
     lines += [f"unwrap = true  # {wrapped[0]} jumps by whole turns"] if wrapped else []
     for i, (file, columns) in enumerate(written.items()):
         last = i == len(written) - 1 and len(written) > 1
-        times = columns["time_s"]
-        rate = f"{times.size} rows at {1.0 / np.median(np.diff(times)):.4g} Hz"
-        lines += ["", "[[records]]", f'file = "{file}"  # {rate}']
+        lines += ["", "[[records]]", f'file = "{file}"  # {about(columns, renamed)}']
         lines += [f'role = "{"holdout" if last else "train"}"' + ("  # GUESS: the last file judges" if last else "")]
     return "\n".join(lines) + "\n"
+
+
+def about(columns: Mapping[str, Array], renamed: Mapping[str, str]) -> str:
+    """Return rows, rate, rest and sensor of a record in words."""
+    times = columns["time_s"]
+    measured = next(h for h in renamed.values() if not h.startswith(("drive_", CURRENT, COMMAND)))
+    values = columns[measured]
+    present = np.flatnonzero(np.isfinite(values))
+    first = values[present[:FEWEST_REST_SAMPLES]]
+    moved = np.flatnonzero(np.abs(values[present] - np.median(first)) > BEYOND_REST * np.ptp(first))
+    n_rest = int(present[moved[0]]) if moved.size and stands_still(first, 0.0, False) else 0
+    shorter = f"fewer than {FEWEST_REST_SAMPLES} rows of rest first"
+    rest = f"{times[n_rest] - times[0]:.3g} s of rest first" if n_rest >= FEWEST_REST_SAMPLES else shorter
+    sensor = sensor_of(values[present])
+    step = f"steps of {sensor.step:.3g}" if sensor.step else "a fine sensor"
+    hold = f", renewed every {sensor.hold} rows" if sensor.hold > 1 else ""
+    return f"{times.size} rows at {1.0 / np.median(np.diff(times)):.4g} Hz, {rest}; {measured}: {step}{hold}"
