@@ -300,7 +300,7 @@ def test_the_package_says_who_made_it_where_it_runs_and_its_workflows_call_ci(re
     workflows = {path.name: path.read_text(encoding="utf-8") for path in (root / ".github/workflows").iterdir()}
     assert "- run: .ci/run\n" in workflows["tests.yml"]
     assert "mkdocs build --strict -f studies/guide/mkdocs.yml" in workflows["site.yml"]
-    assert "[test,notebook,suite,docs,dev]" in (root / ".ci/run").read_text(encoding="utf-8")
+    assert "[test,notebook,suite,nested,docs,dev]" in (root / ".ci/run").read_text(encoding="utf-8")
 
 
 def test_figures_behind_advice_are_those_of_the_results(root):
