@@ -131,19 +131,21 @@ hard = Effect(
 )  # fmt: skip
 
 
-def bend_loss(drive_effort, sharpness, knee):
-    """Effort lost, -E (1 - (1 + x^knee)^(-1/knee)) with x = sharpness abs(E): the knee bends the sharper, the larger.
+def bend_loss(drive_effort, sharpness_squared, knee):
+    """Effort lost, -E (1 - (1 + x^knee)^(-1/knee)) with x^2 = sharpness_squared E^2; a larger knee bends sharper.
 
     A knee of 1 is the rational form, 2.5 close to tanh, and a large one the hard limit.
     """
-    x = sharpness * np.abs(drive_effort)
-    return -drive_effort * (1 - (1 + x**knee) ** (-1 / knee))
+    bent = (sharpness_squared * drive_effort**2) ** (0.5 * knee)
+    return -drive_effort * (1 - (1 + bent) ** (-1 / knee))
 
 
 rapp = Effect(
     name="drive_saturation", form="rapp", adds={"drive": bend_loss},
     parameters=(
-        Parameter("sharpness", "1/effort", 0.0, 4.0, null=0.0, note="1/E_s, E_s the most that is given"),
+        Parameter(
+            "sharpness_squared", "1/effort^2", 0.0, 16.0, null=0.0, note="1/E_s^2, E_s the most that is given"
+        ),
         Parameter("knee", "1", 1.0, 8.0, fixed=2.0, note="how sharply the answer bends at the limit"),
     ),
     note="the drive comes close to a limit along a bend",
