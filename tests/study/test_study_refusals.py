@@ -60,6 +60,7 @@ REFUSED = [
     ('plant = "shell_transfer_arm"', 'plant = "driven_axis"',
      "noise_deg_s is given, but the records are in m/s, noise_mm_s is expected"),
     ("manoeuvres = [{ start", 'campaign = "../c" #', "campaign '../c' leads out of the folder of the study"),
+    ("manoeuvres = [{ start", 'campaign = "a\\u0000b" #', "leads out of the folder of the study"),
     ("manoeuvres = [{ start", 'campaign = "c" #', "does not exist, a folder with a campaign.toml is expected"),
 ]  # fmt: skip
 
@@ -70,6 +71,7 @@ def test_refused_with_one_sentence(write_study, tmp_path):
             run_study(write_study(change=(old, new), more=BOX), out=tmp_path / "out")
         sentence = str(refused.value)
         assert words in sentence, (new, sentence)
+        assert ".toml" in sentence, sentence
         assert "\n" not in sentence
     assert not (tmp_path / "out").exists()
 

@@ -173,7 +173,10 @@ def _campaign_case(
 def campaign_folder(folder: Path, campaign: str, where: str) -> Path:
     """Return where the campaign of a study is; refuse one outside the folder of its file, also through a link."""
     path = folder / campaign.replace("\\", "/")
-    if not all(each.resolve().is_relative_to(folder.resolve()) for each in (path, path / CAMPAIGN_FILE)):
+    # of a text with a null byte no path can be resolved
+    if not campaign.isprintable() or not all(
+        each.resolve().is_relative_to(folder.resolve()) for each in (path, path / CAMPAIGN_FILE)
+    ):
         raise ArmidError(f"{where}: campaign {quoted(campaign)} leads out of the folder of the study, a folder inside "
                          "is expected")  # fmt: skip
     try:
