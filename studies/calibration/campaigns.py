@@ -2,7 +2,8 @@
 
 import json
 import os
-from collections.abc import Iterator
+import traceback
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -106,6 +107,18 @@ def plain(value: Any) -> Any:
     if isinstance(value, (set, frozenset)):
         return sorted(value)
     return str(value)
+
+
+def kept_answer(path: Path, task: Task, answer: Callable[[], dict[str, Any]]) -> str:
+    """Keep what is said of a campaign, or the error in which it ended, with its time; return a line about it."""
+    before = seconds()
+    try:
+        kept = answer()
+    except Exception:
+        kept = {"failed": traceback.format_exc()[-2000:]}
+    kept |= {"cpu_s": seconds() - before}
+    written(path, kept)
+    return f"{task.name} {kept['cpu_s']:.1f} s: {kept.get('verdict', 'FAILED')}"
 
 
 def seconds() -> float:

@@ -9,10 +9,10 @@ stopped.
 import argparse
 import json
 import sys
-import traceback
 import warnings
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 # Names that both versions have.
@@ -28,10 +28,9 @@ from calibration.campaigns import (
     Task,
     file_of,
     former_file,
-    seconds,
+    kept_answer,
     tasks,
     truth_file,
-    written,
 )
 
 KEPT = ("verdict", "parameters")
@@ -42,7 +41,11 @@ def main(words: Sequence[str]) -> int:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--most", type=int, default=None, help="campaigns in all")
     options = parser.parse_args(words)
-    plan = json.loads((options.folder / "plan.json").read_text())
+    head = options.folder / "plan.json"
+    if not head.exists():
+        print(f"former.py: {head} is not there: a folder that run.py has filled is expected", file=sys.stderr)
+        return 2
+    plan = json.loads(head.read_text())
     done = [task for task in tasks(plan["size"]) if file_of(options.folder, task).exists()][: options.most]
     (options.folder / "former").mkdir(exist_ok=True)
     for task in done:
@@ -54,20 +57,17 @@ def main(words: Sequence[str]) -> int:
 def closed(folder: Path, task: Task) -> str:
     """Close one campaign, keep the answer, and return a line about it."""
     warnings.simplefilter("ignore")
+    return kept_answer(former_file(folder, task), task, lambda: answer(folder, task))
+
+
+def answer(folder: Path, task: Task) -> dict[str, Any]:
     entry = json.loads(truth_file(folder, task).read_text())
-    there, before = folder / "campaigns" / task.campaign, seconds()
-    try:
-        registry = load_registry([f"{PLANTS}:{entry['machine']}"] if task.family == MACHINE else [])
-        campaign = read_campaign(there, plants=registry.plants)
-        taken = {effect["name"] for effect in entry["effects"]} if task.family == HIDDEN else set()
-        candidates = {name: each for name, each in EFFECTS.items() if name not in taken} if taken else None
-        report = report_of(close_loop(campaign.model(registry.effects), campaign, candidates))
-        kept = {key: report[key] for key in KEPT}
-    except Exception:
-        kept = {"failed": traceback.format_exc()[-2000:]}
-    kept |= {"cpu_s": seconds() - before}
-    written(former_file(folder, task), kept)
-    return f"{task.name} {kept['cpu_s']:.1f} s: {kept.get('verdict', 'FAILED')}"
+    registry = load_registry([f"{PLANTS}:{entry['machine']}"] if task.family == MACHINE else [])
+    campaign = read_campaign(folder / "campaigns" / task.campaign, plants=registry.plants)
+    taken = {effect["name"] for effect in entry["effects"]} if task.family == HIDDEN else set()
+    candidates = {name: each for name, each in EFFECTS.items() if name not in taken} if taken else None
+    report = report_of(close_loop(campaign.model(registry.effects), campaign, candidates))
+    return {key: report[key] for key in KEPT}
 
 
 if __name__ == "__main__":

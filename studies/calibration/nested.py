@@ -97,6 +97,7 @@ def nested(about: Expansion, scale: Scale) -> tuple[float, float, int]:
         logs = np.array([scale.log_likelihood(float(c)) if np.isfinite(c) else LARGEST_LOSS for c in chi2])
         return logs - 0.5 * fit.records.data.log_cover
 
+    # UltraNest draws from the global generator alone
     np.random.seed(0)
     sampler = ReactiveNestedSampler(names, log_likelihood, transform, vectorized=True)
     found = sampler.run(min_num_live_points=N_LIVE, max_ncalls=MOST_CALLS, viz_callback=False, show_status=False,
@@ -119,7 +120,7 @@ def priors(about: Expansion) -> list[Draw]:
             sign = -1.0 if parameter.null >= high else 1.0
             size = library.strength_of(name, parameter)
             draws.append(strength(parameter.null, sign * size, one_sided))
-        elif is_added and low > 0.0 and high > 5.0 * low:
+        elif about.is_log_uniform[i]:
             draws.append(lambda u, a=np.log(low), b=np.log(high): np.exp(a + (b - a) * u))
         else:
             draws.append(lambda u, a=low, b=high: a + (b - a) * u)
@@ -147,17 +148,21 @@ def page(table: pd.DataFrame, seed: int) -> str:
             by = [row[way] - first[way] for way in ("laplace", "nested")]
             error = float(np.hypot(row["nested_error"], first["nested_error"]))
             pairs.append((name, first["model"], row["model"], *by, error))
-    apart = np.array([abs(laplace - by_samples) for *_, laplace, by_samples, _ in pairs])
+    apart = [abs(laplace - by_samples) for *_, laplace, by_samples, _ in pairs]
+    said = "No campaign has two models to be compared."
+    if pairs:
+        error = np.median([p[-1] for p in pairs])
+        said = (f"Of {len(pairs)} log Bayes factors the two ways differ by {np.median(apart):.2f} in the median, and "
+                f"by {max(apart):.2f} at most; the median error of nested sampling is {error:.2f}.")  # fmt: skip
     head = "| campaign | model | against | log Bayes factor, Laplace | nested sampling | its error |"
     lines = [f"| {name} | {other} | {best} | {a:.2f} | {b:.2f} | {e:.2f} |" for name, best, other, a, b, e in pairs]
+    n = table["campaign"].nunique()
     return "\n".join([
         "# Laplace's evidence against nested sampling", "",
-        f"{table['campaign'].nunique()} synthetic campaigns of the arm, seed {seed}; constants count as known exactly. "
-        f"Of {len(pairs)} log Bayes factors the two ways differ by {np.median(apart):.2f} in the median, and by "
-        f"{apart.max():.2f} at most; the median error of nested sampling is {np.median([p[-1] for p in pairs]):.2f}.",
+        f"{n} synthetic campaigns of the arm, seed {seed}; constants count as known exactly. {said}",
         "", head, "|---|---|---|---|---|---|", *lines, "",
-        f"`python studies/calibration/nested.py FOLDER --seed {seed} --campaigns {table['campaign'].nunique()} --out "
-        "results/nested` makes this page.", "",
+        f"`python studies/calibration/nested.py FOLDER --seed {seed} --campaigns {n} --out results/nested` makes this "
+        "page.", "",
     ])  # fmt: skip
 
 

@@ -8,7 +8,6 @@ FOLDER/closed/NAME.json holds what a report says, and the models of the mixture 
 import argparse
 import json
 import sys
-import traceback
 import warnings
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -23,7 +22,7 @@ from armid.model import EFFECTS
 from armid.model.effects.sensor import sensor_effects
 from armid.record import read_campaign
 from armid.registry import load_registry
-from calibration.campaigns import HIDDEN, MACHINE, PLANTS, Task, campaign_of, file_of, seconds, tasks, written
+from calibration.campaigns import HIDDEN, MACHINE, PLANTS, Task, campaign_of, file_of, kept_answer, tasks, written
 
 KEPT = ("version", "verdict", "also", "effects", "steps", "suspects", "withdrawn", "error", "parameters",
         "probabilities")  # fmt: skip
@@ -65,14 +64,7 @@ def closed(folder: Path, seed: int, without_left_out: bool, task: Task) -> str:
     """Close one campaign, keep the answer, and return a line about it."""
     warnings.simplefilter("ignore")
     there, entry = campaign_of(task, folder, seed, without_left_out)
-    before = seconds()
-    try:
-        kept = kept_of(close(task, there, entry))
-    except Exception:
-        kept = {"failed": traceback.format_exc()[-2000:]}
-    kept |= {"cpu_s": seconds() - before}
-    written(file_of(folder, task), kept)
-    return f"{task.name} {kept['cpu_s']:.1f} s: {kept.get('verdict', 'FAILED')}"
+    return kept_answer(file_of(folder, task), task, lambda: kept_of(close(task, there, entry)))
 
 
 def close(task: Task, there: Path, entry: dict[str, Any]) -> ClosedLoop:

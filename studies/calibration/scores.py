@@ -296,9 +296,7 @@ def of_group(group: str, mine: Sequence[Closed]) -> list[Score]:
     line("held out", "error over noise up to 1.1", lambda c: [r <= 1.1 for r in ratio(c)], ">= 0.85")
     line("held out", "error over noise up to 1.5", lambda c: [r <= 1.5 for r in ratio(c)], ">= 0.97")
     line("S4", "interval score over that of the former loop", Closed.beside_former, "<= 0.7", total=ratio_of(sum))
-    line(
-        "S4", "the same, the median of parameters", Closed.beside_former, total=lambda v: median([m / i for m, i in v])
-    )
+    line("S4", "the same, the median of parameters", Closed.beside_former, total=median_ratio)
     line("time", "processor time of a campaign, median [s]", lambda c: [c.answer["cpu_s"]], "", total=median)
     line("time", "processor time of a campaign, longest [s]", lambda c: [c.answer["cpu_s"]], "", total=max)
     times = Closed.times_beside_former

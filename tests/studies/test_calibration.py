@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from armid.inference.evidence import SCALES_OF_STRENGTH, Scale
+from armid.inference.evidence import SCALES_OF_STRENGTH, Expansion, Scale
 from calibration.campaigns import ARM, HIDDEN, MACHINE, tasks
 from calibration.scores import Closed, Score, calibration_error, interval_score, median, ratio_of, reliability, score
 from calibration.truth import all_found, truth_of
@@ -91,8 +91,9 @@ def test_nested_sampling_finds_the_evidence_of_a_linear_model():
     )  # fmt: skip
     model = SimpleNamespace(parameters=dict.fromkeys("ab"))
     fit = SimpleNamespace(records=records, values={"a": 0.4, "b": 0.6}, model=model)
-    about = SimpleNamespace(fit=fit, library=SimpleNamespace(owner=lambda _: None))
-    log_z, error, _ = nested.nested(about, Scale(60, 1.0, 1e9))
+    scale = Scale(60, 1.0, 1e9)
+    about = Expansion(fit, scale, SimpleNamespace(owner=lambda _: None), np.empty((60, 0)))
+    log_z, error, _ = nested.nested(about, scale)
     _, determinant = np.linalg.slogdet(jacobian.T @ jacobian / (2.0 * np.pi))
     assert error < 0.6
     assert log_z == pytest.approx(-0.5 * (left @ left - 60) - 0.5 * determinant, abs=3.0 * error)

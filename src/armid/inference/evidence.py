@@ -108,12 +108,21 @@ class Expansion:
         density = np.ones(fit.n_free)
         places, _, deviations = fit.records.rows
         density[places] = fit.records.span[places] / deviations / np.sqrt(2.0 * np.pi)
-        for i, (name, value) in enumerate(fit.values.items()):
+        for i in np.flatnonzero(self.is_log_uniform):
             low, high = space.low[space.free][i], space.high[space.free][i]
-            is_shape = self.library.owner(name) is not None and fit.model.parameters[name].null is None
-            if is_shape and i not in places and low > 0.0 and high > 5.0 * low:  # log-uniform
-                density[i] = (high - low) / (max(value, low) * np.log(high / low))
+            density[i] = (high - low) / (max(fit.x[i], low) * np.log(high / low))
         return density
+
+    @cached_property
+    def is_log_uniform(self) -> NDArray[np.bool_]:
+        """Which free parameters are shapes of added effects whose size is unknown: log-uniform over their range."""
+        fit, space = self.fit, self.fit.records.space
+        low, high = space.low[space.free], space.high[space.free]
+        parameters = fit.model.parameters
+        shapes = [self.library.owner(name) is not None and parameters[name].null is None for name in fit.values]
+        wide = np.array(shapes, dtype=np.bool_) & (low > 0.0) & (high > 5.0 * low)
+        wide[fit.records.rows[0]] = False
+        return np.asarray(wide)
 
     @cached_property
     def sizes(self) -> Array:

@@ -33,8 +33,8 @@ def on_short_pieces(library: Library, declared: Fit) -> tuple[Library, Fit] | No
     n_parts = parts_of(library)
     if n_parts == 1:
         return None
-    n_samples = sum(sum(n) for n in library.data.lengths)
-    short = cut_library(library, n_parts, {}, min(-(-n_samples // SAMPLES_IN_PIECES), n_parts))
+    every = min(-(-len(library.data.sound) // SAMPLES_IN_PIECES), n_parts)
+    short = cut_library(library, n_parts, {}, every)
     return short, accurate(fit_from(short.problem((), declared.values), (), [declared.z]), short)
 
 
@@ -72,10 +72,8 @@ def cut_library(library: Library, n_parts: int, starts: Starts, every: int = 1) 
     plant, data = library.declared.plant, library.data
     if n_parts > 1:
         data = library.as_read or data
-        data = replace(
-            data, records=tuple(cut(r, n_parts, plant, i % every, every) for i, r in enumerate(data.records))
-        )
-        data = data.with_levels(data.levels)
+        cut_records = (cut(r, n_parts, plant, i % every, every) for i, r in enumerate(data.records))
+        data = replace(data, records=tuple(cut_records)).with_levels(data.levels)
     records = tuple(restarted(record, starts) for record in data.records)
     as_read = library.as_read if n_parts == 1 else None
     return replace(library.with_data(replace(data, records=records), as_read), _schedules={})

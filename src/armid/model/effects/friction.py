@@ -20,6 +20,9 @@ coulomb = Effect(
 )  # fmt: skip
 
 
+EXCESS = Parameter("level", "effort", 0.0, 0.5, null=0.0, note="excess of friction at rest over friction in motion")
+
+
 def stribeck_torque(omega, level, fade, exponent, width):
     """Effort of the excess, -level exp(-abs(omega/fade)^exponent) sign(omega), the sign smoothed over width.
 
@@ -37,16 +40,16 @@ def hess_soom_torque(omega, level, fade, width):
 hess_soom = Effect(
     name="stribeck", form="hess_soom", adds={"torque": hess_soom_torque},
     parameters=(
-        Parameter("level", "effort", 0.0, 0.5, null=0.0, note="excess of friction at rest over friction in motion"),
+        EXCESS,
         Parameter("fade", "speed", 0.02, 0.5, nominal=0.08, note="speed at which half of the excess has faded"),
         SIGN_WIDTH,
     ),
     note="friction that is higher at low speed, and fades slowly", source="Hess, Soom 1990, doi:10.1115/1.2920240",
 )  # fmt: skip
 stribeck = Effect(
-    name="stribeck", forms=(hess_soom,), form="exponential", adds={"torque": stribeck_torque},
+    name="stribeck", form="exponential", forms=(hess_soom,), adds={"torque": stribeck_torque},
     parameters=(
-        Parameter("level", "effort", 0.0, 0.5, null=0.0, note="excess of friction at rest over friction in motion"),
+        EXCESS,
         Parameter("fade", "speed", 0.02, 0.5, nominal=0.08, note="speed at which the excess has faded to 1/e"),
         Parameter("exponent", "1", 0.5, 2.0, fixed=2.0, note="power of the speed in the exponential"),
         SIGN_WIDTH,
