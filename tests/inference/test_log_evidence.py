@@ -173,3 +173,20 @@ def test_a_half_normal_has_the_mean_and_deviation_of_its_samples(at):
     drawn = RNG.normal(at, 1.0, 8_000_000)
     kept = drawn[drawn > 0.0] if at > -5.0 else RNG.exponential(1.0 / 8.0, 100_000)
     assert truncated(at, 1.0) == pytest.approx((kept.mean(), kept.std()), rel=0.03)
+
+
+def test_a_denied_name_leaves_its_weight_to_what_nobody_knows_and_none_to_its_rival():
+    def mixture(parameters, *atoms):
+        return Posterior(tuple(
+            Atom(np.log(p), 0.0, frozenset(names), np.array(values), np.ones(len(values)))
+            for p, names, values in atoms), parameters)  # fmt: skip
+
+    denied, rival, unknown = ("effect", "denied"), ("effect", "rival"), ("unknown", "torque")
+    found = mixture(("p", "rival.size"), (0.6, {denied}, (1.0, np.nan)), (0.4, {rival}, (2.0, 7.0)))
+    standing = mixture(("q", "p"), (0.9, {unknown}, (5.0, 3.0)), (0.1, set(), (6.0, 4.0)))
+    left = found.without(frozenset({denied}), standing)
+    assert left.sets == pytest.approx({frozenset({unknown}): 0.54, frozenset({rival}): 0.4, frozenset(): 0.06})
+    means = {names: dict(zip(left.parameters, atom.mean, strict=True))
+             for atom in left.atoms for names in [tuple(n for _, n in atom.names)]}  # fmt: skip
+    assert means["rival",] == pytest.approx({"q": np.nan, "p": 2.0, "rival.size": 7.0}, nan_ok=True)
+    assert means["torque",] == pytest.approx({"q": 5.0, "p": 3.0, "rival.size": np.nan}, nan_ok=True)

@@ -97,7 +97,8 @@ class Inference:
     def without(self, denied: Hypotheses, standing: Hypotheses) -> "Inference":
         """Return what is probable where held-out records deny some hypotheses; standing: the model that is left."""
         exploration = without_denied(self.exploration, denied, standing)
-        return Inference(exploration, posterior(exploration), standing)
+        gone = frozenset(h.public for h in denied)
+        return Inference(exploration, self.posterior.without(gone, posterior(exploration)), standing)
 
     def after_holdout(self, over: Sequence[bool]) -> "Inference":
         """Return what is probable where some of the records held out are missed by more than noise.

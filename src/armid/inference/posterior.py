@@ -118,6 +118,32 @@ class Posterior:
         return replace(self, atoms=tuple(replace(a, log_prior=a.log_prior + np.log(p), names=a.names | more)
                                          for a in self.atoms for p, more in shares))  # fmt: skip
 
+    def without(self, denied: frozenset[tuple[str, str]], instead: "Posterior") -> "Posterior":
+        """Return the mixture where models that hold what is denied leave their weight to another mixture.
+
+        The others are as probable as before: what denies a name is no reason to believe in its rival.
+        """
+        names = tuple(dict.fromkeys((*instead.parameters, *self.parameters)))
+        own, other = self.over(names), instead.over(names)
+        pairs = list(zip(own.atoms, own.weights, strict=True))
+        sound = [(atom, weight) for atom, weight in pairs if not atom.names & denied]
+        lost = 1.0 - sum(weight for _, weight in sound)
+        sound += [(atom, lost * weight) for atom, weight in zip(other.atoms, other.weights, strict=True)]
+        atoms = tuple(replace(a, log_evidence=0.0, log_prior=float(np.log(w))) for a, w in sound if w > 0.0)
+        return replace(own, atoms=atoms, known=np.fmin(own.known, other.known))
+
+    def over(self, names: tuple[str, ...]) -> "Posterior":
+        """Return the same mixture with other parameters, NaN for those that it does not know."""
+        places = [self.parameters.index(n) if n in self.parameters else -1 for n in names]
+
+        def taken(values: Array) -> Array:
+            return np.append(values, np.nan)[places]
+
+        atoms = tuple(replace(a, mean=taken(a.mean), deviation=taken(a.deviation)) for a in self.atoms)
+        declared = None if self.declared is None else taken(self.declared)
+        known = taken(np.broadcast_to(self.known, len(self.parameters)))
+        return replace(self, atoms=atoms, parameters=names, declared=declared, known=known)
+
     @property
     def nothing(self) -> float:
         return self.sets.get(frozenset(), 0.0)
