@@ -391,7 +391,7 @@ def rewritten(
         if header not in table.headers:
             raise ArmidError(f"{table.where}: no column {quoted(header)} is there, as in the first file: files of one "
                              "machine with the same columns are expected")  # fmt: skip
-        table.numbers(header, gaps=header != time)
+        table.numbers(header, gaps=header != time and renamed.get(header) != drive[0])
     times = table.columns[time] if second == 1.0 else np.round(table.columns[time] * second, 12)
     taken = {"time_s", *renamed.values()}
     # an encoder that is not used must not be taken for an output, which wants the counts of a turn

@@ -10,15 +10,17 @@ import numpy as np
 
 from armid.inference.checks import Residuals
 from armid.inference.missing_signal import Dependence, Missing, hats
-from armid.loop.result import ClosedLoop
+from armid.loop.result import ClosedLoop, Judgement
 from armid.model import Array
 from armid.problem.problem import Replay
 from armid.report.document import points, record_axes, small_axes, value_text
 from armid.report.style import COLOURS, GREY, OKABE_ITO, PALE, entitle, legend_below, log_axis, panels, pyplot
 from armid.units import scale_of, shown
 
-LOOKS = (("before", OKABE_ITO["vermilion"]), ("after", OKABE_ITO["blue"]))
 AFTER = OKABE_ITO["blue"]
+LOOKS = (("before", OKABE_ITO["vermilion"]), ("after", AFTER))
+# Where nothing was added, before and after are one.
+ALONE = ("declared model", AFTER)
 KINDS_OF_TEST = {
     "record": "record",
     "stage": "stage of the motion",
@@ -49,47 +51,59 @@ def figures_of(loop: ClosedLoop, report: Mapping[str, Any], details: Mapping[str
     return made if loop.missing is None else made | {"missing": partial(missing_figure, loop, loop.missing)}
 
 
-def shown_records(loop: ClosedLoop) -> list[tuple[Replay, Array, Array]]:
-    """Return the records that are drawn, each with its residual before and after."""
-    views = ((loop.before.train, loop.after.train), (loop.before.holdout, loop.after.holdout))
-    return [row for old, new in views if old is not None and new is not None
-            for row in zip(old.replays, old.raw, new.raw, strict=True)][-MOST_RECORDS_DRAWN:]  # fmt: skip
+def drawn_of(loop: ClosedLoop) -> list[tuple[str, str, Judgement]]:
+    """Return the models that are drawn, each with its name and colour: the declared one alone where nothing is new."""
+    if loop.before is loop.after:
+        return [(*ALONE, loop.after)]
+    return [(*look, judged) for look, judged in zip(LOOKS, (loop.before, loop.after), strict=True)]
+
+
+def shown_records(loop: ClosedLoop) -> list[tuple[Replay, list[Array]]]:
+    """Return the records that are drawn, each with its residual by each model that is drawn."""
+    judged = [j for *_, j in drawn_of(loop)]
+    views = ([j.train for j in judged], [j.holdout for j in judged if j.holdout is not None])
+    return [(replay, list(raw)) for view in views if view
+            for replay, *raw in zip(view[0].replays, *(v.raw for v in view), strict=True)
+            ][-MOST_RECORDS_DRAWN:]  # fmt: skip
+
+
+def names_of(loop: ClosedLoop, what: str) -> str:
+    """Return what figures of records are titled."""
+    added = " + ".join(loop.effects) or "faults of records undone"
+    return f"{what}, declared model" if loop.before is loop.after else f"{what}, before and after ({added})"
 
 
 def motion_figure(loop: ClosedLoop) -> Any:
-    """Draw the measured motion of each record, and the motion simulated before and after."""
+    """Draw the measured motion of each record, and the simulated one."""
     rows = shown_records(loop)
     figure, axes = record_axes(len(rows), 2.9)
-    for (axis,), (replay, *residuals) in zip(axes, rows, strict=True):
+    for (axis,), (replay, residuals) in zip(axes, rows, strict=True):
         factor, unit = shown(1.0, replay.record.unit)
         axis.plot(replay.times, factor * replay.measured, color=PALE, lw=3.5, label="measured")
-        for residual, (name, colour), width in zip(residuals, LOOKS, (1.3, 1.0), strict=True):
-            axis.plot(replay.times, factor * (replay.measured - residual), color=colour, lw=width, label=name)
+        for residual, (name, colour, _) in zip(residuals, drawn_of(loop), strict=True):
+            axis.plot(replay.times, factor * (replay.measured - residual), color=colour, lw=1.1, label=name)
         axis.set(ylabel=f"{replay.record.output or 'output'} [{unit}]", xlabel="time [s]")
         axis.margins(x=0.01)
         axis.set_title(f"{replay.name} ({replay.record.role})", fontsize="medium")
     figure.legend(*axes[0][0].get_legend_handles_labels(), loc="lower center", ncols=3, frameon=False)
-    names = " + ".join(loop.effects) or "no effect added"
-    entitle(figure, f"{loop.campaign.name}: measured and simulated, before and after ({names})")
+    entitle(figure, f"{loop.campaign.name}: {names_of(loop, 'measured and simulated')}")
     return figure
 
 
 def residual_figure(loop: ClosedLoop) -> Any:
-    """Draw measured minus simulated of each record, before and after, with the noise as a band."""
-    rows = shown_records(loop)
+    """Draw measured minus simulated of each record, with the noise as a band."""
+    rows, names = shown_records(loop), [name for name, *_ in drawn_of(loop)]
     figure, axes = record_axes(len(rows), 2.9)
-    for (axis,), (replay, before, after) in zip(axes, rows, strict=True):
-        curves = {"before": (replay.times, before), "after": (replay.times, after)}
+    for (axis,), (replay, residuals) in zip(axes, rows, strict=True):
+        curves = {name: (replay.times, residual) for name, residual in zip(names, residuals, strict=True)}
         factor, unit = shown(1.0, replay.record.unit)
         noise = loop.outputs.get(replay.record.output, {"noise_rms": loop.noise_rms})["noise_rms"]
         draw_residuals(axis, curves, noise, replay.record.unit)
-        errors = [factor * float(np.sqrt(np.mean(x**2))) for x in (before, after)]
-        record = replay.record
-        title = f"{replay.name} ({record.role}), RMSE {errors[0]:.3g} to {errors[1]:.3g} {unit}"
+        errors = [f"{factor * float(np.sqrt(np.mean(x**2))):.3g}" for x in residuals]
+        title = f"{replay.name} ({replay.record.role}), RMSE {' to '.join(errors)} {unit}"
         axis.set_title(title, fontsize="medium")
     figure.legend(*axes[0][0].get_legend_handles_labels(), loc="lower center", ncols=3, frameon=False)
-    names = " + ".join(loop.effects) or "no effect added"
-    entitle(figure, f"{loop.campaign.name}: residual before and after ({names})")
+    entitle(figure, f"{loop.campaign.name}: {names_of(loop, 'residual')}")
     return figure
 
 
@@ -106,16 +120,15 @@ def draw_residuals(axis: Any, curves: Mapping[str, Any], noise: float | None, si
     if noise is not None:
         band = 2.0 * noise * factor
         axis.axhspan(-band, band, color=GREY, alpha=0.35, lw=0, label="noise, 2 sigma")
-    for name, colour in LOOKS:
-        x, y = curves[name]
-        axis.plot(x, factor * y, color=colour, lw=0.9, label=name, gid=name)
+    for name, (x, y) in curves.items():
+        axis.plot(x, factor * y, color=dict((*LOOKS, ALONE))[name], lw=0.9, label=name, gid=name)
     axis.set(ylabel=f"residual [{unit}]", xlabel="time [s]")
     axis.margins(x=0.01)
 
 
 def diagnosis_figure(loop: ClosedLoop) -> Any:
     """Draw a bar for each part of the residual, from 1, which is noise, to its mean square; the largest come first."""
-    before, after = loop.before.diagnosis, loop.after.diagnosis
+    before, drawn = loop.before.diagnosis, drawn_of(loop)
     kinds = {k: sorted(before.of_kind(k), key=lambda f: -f.ratio) for k in KINDS_OF_TEST if before.of_kind(k)}
     heights = [len(findings) + 1 for findings in kinds.values()]
     size = (7.6, 0.34 * sum(heights) + 1.4)
@@ -123,10 +136,11 @@ def diagnosis_figure(loop: ClosedLoop) -> Any:
                                      layout="constrained")  # fmt: skip
     for axis, (kind, findings) in zip(axes.flat, kinds.items(), strict=True):
         rows = np.arange(len(findings))
-        for diagnosis, (label, colour), shift in zip((before, after), LOOKS, (-0.19, 0.19), strict=True):
-            ratios = {f.where: f.ratio for f in diagnosis.of_kind(kind)}
+        for i, (label, colour, judged) in enumerate(drawn):
+            ratios = {f.where: f.ratio for f in judged.diagnosis.of_kind(kind)}
             ends = np.array([ratios.get(f.where, 1.0) for f in findings])
-            axis.barh(rows + shift, np.maximum(ends, LEAST_RATIO) - 1.0, 0.36, left=1.0, color=colour, label=label)
+            places = rows + 0.38 * (i - 0.5 * (len(drawn) - 1))
+            axis.barh(places, np.maximum(ends, LEAST_RATIO) - 1.0, 0.36, left=1.0, color=colour, label=label)
         axis.axvline(1.0, color=GREY, lw=1.0)
         axis.set_yticks(rows, [f.where for f in findings], fontsize="small")
         axis.set_ylim(len(findings) - 0.5, -0.5)
@@ -141,14 +155,14 @@ def diagnosis_figure(loop: ClosedLoop) -> Any:
 
 def against_figure(loop: ClosedLoop) -> Any:
     """Draw the residual of the train records against speed and position, with its mean over equally many samples."""
-    seen, model = (loop.before.train, loop.after.train), loop.before.train.model
-    names, places = moved(loop), sorted({r.place for r in seen[0].replays})
+    first = loop.before.train
+    names, places, model = moved(loop), sorted({r.place for r in first.replays}), first.model
     figure, axes = panels(len(names) * len(places), len(names), 5.6, 3.6)
     for axis, (place, name) in zip(axes, product(places, names), strict=True):
         factor, unit = shown(1.0, unit_of(name, model))
         height, signal_unit = shown(1.0, model.plant.outputs[place].unit)
-        for residuals, (label, colour) in zip(seen, LOOKS, strict=True):
-            x, y = sorted_by(residuals, name, place)
+        for label, colour, judged in drawn_of(loop):
+            x, y = sorted_by(judged.train, name, place)
             axis.plot(factor * x, height * y, ".", ms=1.5, alpha=0.25, color=colour)
             means = [np.array([part.mean() for part in np.array_split(values, MOST_BINS)]) for values in (x, y)]
             axis.plot(factor * means[0], height * means[1], color=colour, lw=2.0, label=label)
@@ -258,7 +272,7 @@ def parameter_figure(campaign: str, parameters: Mapping[str, Mapping[str, Any]],
 def autocorrelation_figure(loop: ClosedLoop) -> Any:
     figure, axis = pyplot().subplots(figsize=(6.8, 3.6), layout="constrained")
     interval = loop.campaign.train[0].spacing
-    for judged, (name, colour) in zip((loop.before, loop.after), LOOKS, strict=True):
+    for name, colour, judged in drawn_of(loop):
         values = correlation(judged.train)
         axis.plot(1e3 * interval * np.arange(len(values)), values, color=colour, lw=1.6, label=name)
     band = 1.96 / np.sqrt(len(loop.after.train.residual))
