@@ -170,6 +170,8 @@ def predicting_best(
     best = missed[int(np.argmin([np.mean(x) for x in missed]))]
 
     def is_near(own: Array) -> bool:
+        if own is best or not np.isfinite(own).all():
+            return own is best
         apart = own - best
         return bool(np.mean(apart) <= np.std(apart, ddof=1) / np.sqrt(len(apart)))
 
@@ -191,7 +193,11 @@ def parts_of(data: WhitenedData) -> list[NDArray[np.int64]]:
 
 
 def misses(fit: Fit) -> Array:
-    """Return the mean square by which a model misses each part, fitted without it, (n_parts,)."""
+    """Return the logarithm of the mean square by which a model misses each part, fitted without it, (n_parts,).
+
+    It is the deviance of a sample where the scale of each part is unknown. Where a model is wrong no noise is common
+    to all parts, and a mean of squares is that of the worst one.
+    """
     data, squares = fit.records.data, []
     for part in parts_of(data):
         sound = data.sound.copy()
@@ -200,4 +206,4 @@ def misses(fit: Fit) -> Array:
         z = descend(problem, [fit.z], ROUGHLY) if fit.n_free else fit.z
         left = fit.records.plain.residuals(z)[0][part]
         squares.append(float(np.mean(left**2)) if np.isfinite(left).all() else np.inf)
-    return np.array(squares)
+    return np.log(squares)

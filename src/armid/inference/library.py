@@ -317,6 +317,8 @@ FEWEST_SPARED, SHARES_OF_ERROR = 4, (1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
 # Strengths that are tried, as shares of the way from the null to a bound; shapes: points along each of 1, 2, 3 ranges.
 STRENGTHS_TRIED, STRENGTHS_OF_SHAPES = (0.03, 0.1, 0.3, 1.0), (0.05, 0.4)
 SHAPES = {0: (), 1: (8,), 2: (7, 3), 3: (5, 3, 2)}
+# Ratio of sampling intervals within which what is tried is simulated in the same steps.
+SAME_INTERVAL = 1.05
 # What the engine's error may add to chi2 of a residual that is noise, and in proportion to one that is more.
 HIDDEN_ERROR = 0.1
 
@@ -333,7 +335,7 @@ def calibrated_replays(
     """Make records ready to be simulated, as accurately as their noise asks for or as a decision can tell.
 
     near: values about which it is calibrated; the candidates lie within a factor of 2 of them. on_one: on one record of
-    each sampling interval, for all others of that interval. noise: of each signal [its unit]; hidden: largest mean
+    each sampling interval, for all others of about the same. noise: of each signal [its unit]; hidden: largest mean
     square of the engine's error, in units of the noise.
     """
     low, high = space.low[space.free].copy(), space.high[space.free].copy()
@@ -362,7 +364,9 @@ def calibrated_replays(
                 allowed[outputs.index(signal.output) if signal.output else 0] = np.sqrt(hidden) * next(levels)
         record = record.until_window_end()  # noqa: PLW2901
         accuracy = accuracy_against(record.noises, model)
-        likenesses = [(accuracy, p.manoeuvre.interval if on_one else p.manoeuvre.likeness()) for p in record.pieces]
+        about = [int(np.log(p.manoeuvre.interval) / np.log(SAME_INTERVAL)) for p in record.pieces]
+        likenesses = [(accuracy, i if on_one else p.manoeuvre.likeness())
+                      for p, i in zip(record.pieces, about, strict=True)]  # fmt: skip
         for likeness, piece in zip(likenesses, record.pieces, strict=True):
             if likeness not in known:
                 known[likeness] = quickly_calibrated(model, piece.manoeuvre, spread, allowed, accuracy)

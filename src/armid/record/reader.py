@@ -70,7 +70,7 @@ def record_of(table: CsvTable, sheet: RecordSheet, campaign: CampaignSheet, plan
         input_noise=input_noises(plant, table, sources, measured),
     )
     tracks = {} if plant.from_rest else tracks_of(record, plant, table, lambda *what: read(*what)[0])
-    return with_window(started(record, plant, tracks, where), sheet.window_s, where)
+    return with_window(started(record, plant, tracks, where), sheet.window_s, f"{where}, window_s")
 
 
 def manoeuvre_of(

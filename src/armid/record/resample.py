@@ -258,7 +258,7 @@ def window_samples(record: Record, window_s: Sequence[float] | None, where: str)
     if window_s is not None:
         begin, end = window_s
         if not begin < end:
-            raise ArmidError(f"{where}: window_s is [{begin:g}, {end:g}], an end after its beginning is expected")
+            raise ArmidError(f"{where}: the window is [{begin:g}, {end:g}] s, an end after its beginning is expected")
         ends = np.clip((np.array([begin, end]) - grid.start_time) / grid.interval, -1.0, n_samples)
         low = max(int(np.ceil(ends[0] - SLACK)), low)
         high = min(int(np.floor(ends[1] + SLACK)) + 1, high)
