@@ -119,9 +119,9 @@ class Posterior:
                                          for a in self.atoms for p, more in shares))  # fmt: skip
 
     def without(self, denied: frozenset[tuple[str, str]], instead: "Posterior") -> "Posterior":
-        The others are as probable as before: no rival is more credible because a name is denied.
+        """Return the mixture where models that hold what is denied leave their weight to another mixture.
 
-        The others are as probable as before: what denies a name is no reason to believe in its rival.
+        The others are as probable as before: a denied name makes its rivals no more credible.
         """
         names = tuple(dict.fromkeys((*instead.parameters, *self.parameters)))
         own, other = self.over(names), instead.over(names)
