@@ -20,7 +20,7 @@ from armid.units import scale_of, shown
 AFTER = OKABE_ITO["blue"]
 LOOKS = (("before", OKABE_ITO["vermilion"]), ("after", AFTER))
 # Where nothing was added, before and after are one.
-ALONE = ("declared model", AFTER)
+UNCHANGED = ("declared model", AFTER)
 KINDS_OF_TEST = {
     "record": "record",
     "stage": "stage of the motion",
@@ -54,7 +54,7 @@ def figures_of(loop: ClosedLoop, report: Mapping[str, Any], details: Mapping[str
 def drawn_of(loop: ClosedLoop) -> list[tuple[str, str, Judgement]]:
     """Return the models that are drawn, each with its name and colour: the declared one alone where nothing is new."""
     if loop.before is loop.after:
-        return [(*ALONE, loop.after)]
+        return [(*UNCHANGED, loop.after)]
     return [(*look, judged) for look, judged in zip(LOOKS, (loop.before, loop.after), strict=True)]
 
 
@@ -121,7 +121,7 @@ def draw_residuals(axis: Any, curves: Mapping[str, Any], noise: float | None, si
         band = 2.0 * noise * factor
         axis.axhspan(-band, band, color=GREY, alpha=0.35, lw=0, label="noise, 2 sigma")
     for name, (x, y) in curves.items():
-        axis.plot(x, factor * y, color=dict((*LOOKS, ALONE))[name], lw=0.9, label=name, gid=name)
+        axis.plot(x, factor * y, color=dict((*LOOKS, UNCHANGED))[name], lw=0.9, label=name, gid=name)
     axis.set(ylabel=f"residual [{unit}]", xlabel="time [s]")
     axis.margins(x=0.01)
 

@@ -22,8 +22,7 @@ from armid.study.analyses.errors import ERRORS
 from armid.study.analyses.fitness_quality import FITNESS_QUALITY
 from armid.study.analyses.overview import OVERVIEW, RUNS_ANALYSIS, campaigns, counted, loop_runs, main_table, verdicts
 from armid.study.analyses.ranks import BY_CLASS, RANKS, class_ranks
-from armid.study.analyses.running_time import BEST_FITNESS, RUNNING_TIME
-from armid.study.analyses.success import SUCCESS
+from armid.study.analyses.success import BEST_FITNESS, RUNNING_TIME, SUCCESS
 from armid.study.analyses.table1 import TABLE1
 from armid.study.analyses.table2 import TABLE2
 from armid.study.results import StudyResults

@@ -5,8 +5,7 @@
 - table1, table2: the paper's tables beside ours
 - cramer_rao: scatter of the estimates against the bound
 - fitness_quality: which fitness gives right parameters
-- success: how often all parameters end within a tolerance
-- running_time: simulations until the parameters are right, until the fitness is best
+- success: how often all parameters end within a tolerance; simulations until they are right, until the fitness is best
 - convergence: error and fitness against simulations
 - errors: by identifier and case; where runs end
 - ranks: which identifiers differ

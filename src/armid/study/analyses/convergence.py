@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from armid.report.document import Column, Figure, Part, Table, slug
 from armid.study.analyses.analysis import BUDGET_COLUMN, VARIANT, Analysis, Evidence, fitness_scale
-from armid.study.analyses.running_time import PAIRS_HIT, SHARE_AXES, line_panels, share_hit
+from armid.study.analyses.success import PAIRS_HIT, SHARE_AXES, line_panels, share_hit
 
 Array = NDArray[np.floating[Any]]
 ERROR_LABEL = "largest relative error [%]"
