@@ -1,7 +1,6 @@
 """The document of an examination, and what is stored of it: identifiability.json."""
 
 from collections.abc import Callable, Mapping, Sequence
-from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -27,7 +26,7 @@ from armid.report.document import (
     table,
 )
 from armid.report.result import Parts
-from armid.report.style import GREY, OKABE_ITO, look, pyplot
+from armid.report.style import GREY, OKABE_ITO, entitle, legend_below, look, panels
 from armid.units import scale_of, shown
 
 PACKAGES_OF_IDENTIFIABILITY = ("armid", "numpy", "scipy", "numba")
@@ -42,9 +41,9 @@ FIGURES = {
                  "95 % interval ends where the curve meets the dotted threshold; where it leaves the parabola, the "
                  "interval by curvature is not to be believed."),
     "pairs": PAIRS,
-    "sensitivities": ("What the records see", "Correlation of the estimates, the share of the information on each "
-                      "parameter that comes from each record, and d speed / d parameter against time, each scaled to "
-                      "its largest value: curves that look alike are collinear."),
+    "sensitivities": ("What the records see", "d speed / d parameter against time, each scaled to its largest value: "
+                      "curves that look alike are collinear; and the share of the information on each parameter that "
+                      "comes from each record."),
 }  # fmt: skip
 
 
@@ -133,17 +132,17 @@ def deviation_text(name: str, p: Mapping[str, Any], deviation: float | None) -> 
     return "{:.2g} {}".format(*shown(deviation, p["unit"])).removesuffix(" 1")
 
 
-def offer_table(result: Mapping[str, Any], most: int = MOST_OFFERS) -> Table:
+def offer_table(result: Mapping[str, Any]) -> Table:
     """Return the best offers: manoeuvre, deviation of each parameter after one such record; the best repeat is last."""
     names, offers = list(result["parameters"]), result["offers"]
     if len(names) > MOST_COLUMNS:
         names = most_helped(names, offers)
     n_all = len(result["parameters"])
     some = "" if len(names) == n_all else f", {len(names)} of {n_all} parameters"
-    repeats = [offer for offer in offers[most:] if " once more" in offer["words"]][:1]
+    repeats = [offer for offer in offers[MOST_OFFERS:] if " once more" in offer["words"]][:1]
     entries = {name: result["parameters"][name] for name in names}
     rows = [("none", *(deviation_text(name, p, p["deviation"]) for name, p in entries.items()), 1.0)]
-    for offer in (*offers[:most], *repeats):
+    for offer in (*offers[:MOST_OFFERS], *repeats):
         cells = [deviation_text(name, p, offer["deviation"][name]["after"]) for name, p in entries.items()]
         rows.append((offer["words"], *cells, offer["gain"]))
     columns = ["one more record of", *names, Column("gain", "gain", ".3g")]
@@ -180,7 +179,7 @@ def result_of(examination: Examination) -> dict[str, Any]:
         "fixed": {n: float(v) for n, v in zip(space.names, space.fixed, strict=True) if not np.isnan(v)},
         "correlation": {name: dict(zip(names, row, strict=True)) for name, row in zip(names, correlation, strict=True)},
         "collinearity_index": collinearity_index(fisher),
-        "groups": [plain(g) | {"direction": by_name(g.names, g.direction)} for g in examination.groups],
+        "groups": [plain(g) | {"direction": dict(zip(g.names, g.direction, strict=True))} for g in examination.groups],
         "directions": directions(fisher, names),
         "records": {file: {"level": level.rms, **plain(level)} for file, level in levels.items()},
         "ranked_by": examination.ranked_by,
@@ -196,35 +195,26 @@ def result_of(examination: Examination) -> dict[str, Any]:
 
 
 def entries_of(examination: Examination) -> dict[str, dict[str, Any]]:
-    return {p.name: entry(examination, i, p) for i, p in enumerate(examination.profiles)}
-
-
-def entry(examination: Examination, i: int, profile: Profile) -> dict[str, Any]:
-    value, half = float(examination.x[i]), float(examination.information.half_width[i])
-    return {
-        "value": value, "unit": profile.unit, "deviation": examination.information.deviation[i],
-        "deviation_with_tolerances": examination.wider[i],
-        "low": value - half, "high": value + half,
-        "bound_low": profile.box[0], "bound_high": profile.box[1], "bound_active": bool(examination.at_bound[i]),
+    information, x = examination.information, examination.x
+    columns = zip(examination.profiles, x, information.deviation, examination.wider, information.half_width,
+                  examination.at_bound, strict=True)  # fmt: skip
+    return {p.name: {
+        "value": value, "unit": p.unit, "deviation": deviation, "deviation_with_tolerances": wider,
+        "low": value - half, "high": value + half, "bound_low": p.box[0], "bound_high": p.box[1],
+        "bound_active": held,
         "profile": {
-            "minimum": profile.estimate, "low": profile.low, "high": profile.high,
-            "bounded_low": profile.bounded[0], "bounded_high": profile.bounded[1],
-            "agrees_with_curvature": profile.agrees,
-            "values": profile.values, "rise": profile.rise,
+            "minimum": p.estimate, "low": p.low, "high": p.high, "bounded_low": p.bounded[0],
+            "bounded_high": p.bounded[1], "agrees_with_curvature": p.agrees, "values": p.values, "rise": p.rise,
         },
-    }  # fmt: skip
+    } for p, value, deviation, wider, half, held in columns}  # fmt: skip
 
 
 def directions(fisher: Array, names: Sequence[str]) -> list[dict[str, Any]]:
     scaled, seen = normalised(fisher)
     kept = [n for n, s in zip(names, seen, strict=True) if s]
     values, vectors = np.linalg.eigh(scaled)
-    pairs = zip(values, vectors.T, strict=True)
-    return [{"eigenvalue": float(value), "vector": by_name(kept, vector)} for value, vector in pairs]
-
-
-def by_name(names: Sequence[str], values: Array) -> dict[str, float]:
-    return dict(zip(names, (float(v) for v in values), strict=True))
+    return [{"eigenvalue": value, "vector": dict(zip(kept, vector, strict=True))}
+            for value, vector in zip(values, vectors.T, strict=True)]  # fmt: skip
 
 
 def remarks(examination: Examination) -> list[str]:
@@ -329,9 +319,8 @@ def level_text(level: Level, unit: str, noise: float) -> str:
 
 
 def offer_text(examination: Examination, offer: Offer) -> str:
-    i = offer.best
-    name, p = examination.space.free_names[i], entry(examination, i, examination.profiles[i])
-    before, after = (deviation_text(name, p, float(d[i])) for d in (offer.before, offer.after))
+    name, p = list(entries_of(examination).items())[offer.best]
+    before, after = (deviation_text(name, p, float(d[offer.best])) for d in (offer.before, offer.after))
     return f"{offer.feasible.name}: {name} from {before} to {after}"
 
 
@@ -339,7 +328,6 @@ CURVE, QUADRATIC, LIMIT = OKABE_ITO["blue"], OKABE_ITO["vermilion"], OKABE_ITO["
 # The top of a profile's panel, and by how much its sides go beyond what was tried, as a share.
 TOP, SIDE = 6.5, 0.04
 MOST_RECORDS_SHOWN, MOST_PANELS = 4, 12
-LINE_WIDTH = 60
 
 
 def figures_of(examination: Examination) -> dict[str, Callable[[], Any]]:
@@ -350,19 +338,12 @@ def figures_of(examination: Examination) -> dict[str, Callable[[], Any]]:
 
 def profile_figure(examination: Examination) -> Any:
     shown = examination.profiles[:MOST_PANELS]
-    columns = min(len(shown), 2 if len(shown) <= 4 else 3)
-    rows = -(-len(shown) // columns)
-    size = (4.6 * columns, 3.3 * rows + 1.0)
-    figure, axes = pyplot().subplots(rows, columns, figsize=size, squeeze=False, sharey=True, layout="constrained")
-    for axis, profile in zip(axes.flat, shown, strict=False):
+    figure, axes = panels(len(shown), 2 if len(shown) <= 4 else 3, 4.6, 3.6)
+    for axis, profile in zip(axes, shown, strict=True):
         draw_profile(axis, profile)
-    for axis in axes.flat[len(shown) :]:
-        axis.set_visible(False)
-    for axis in axes[:, 0]:
-        axis.set_ylabel("rise of chi2")
-    handles = dict(pair for axis in axes.flat for pair in zip(*axis.get_legend_handles_labels()[::-1], strict=True))
-    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=3, frameon=False)
-    figure.suptitle(fill(f"{title(examination)}: profile likelihood", LINE_WIDTH * columns // 2 + 15), fontsize="large")
+    handles = {handle.get_label(): handle for axis in axes for handle in axis.get_legend_handles_labels()[0]}
+    legend_below(figure, 3, list(handles.values()))
+    entitle(figure, f"{title(examination)}: profile likelihood", "large")
     return figure
 
 
@@ -383,7 +364,7 @@ def draw_profile(axis: Any, profile: Profile) -> None:
     axis.plot(profile.estimate * factor, 0.0, color=LIMIT, marker="D", ms=6, ls="none", clip_on=False, zorder=5,
               label="estimate")  # fmt: skip
     name = f"{profile.name} [{unit}]" if unit != "1" else profile.name
-    axis.set(xlim=(left * factor, right * factor), ylim=(0.0, TOP), xlabel=name)
+    axis.set(xlim=(left * factor, right * factor), ylim=(0.0, TOP), xlabel=name, ylabel="rise of chi2")
     axis.ticklabel_format(axis="x", useOffset=False, style="plain")
     axis.locator_params(axis="x", nbins=4)
 
@@ -409,36 +390,18 @@ def view(profile: Profile) -> tuple[float, float]:
 
 
 def sensitivity_figure(examination: Examination) -> Any:
-    """Draw correlations, the information of each record, and the sensitivities of the most informative records.
-
-    With one record its sensitivities are drawn next to the correlations.
-    """
+    """Draw the sensitivities of the most informative records, and of several the information that each holds."""
     space, replays, weights = examination.space, examination.replays, level_weights(examination.information.levels)
     # d signal / d parameter of each record in units of its level, (n_samples, n_free) each
     jacobians = [w * sensitivities(r, space, examination.x) for w, r in zip(weights, replays, strict=True)]
-    order = telling(examination, jacobians)
-    n = len(space.free_names)
-    height, rows = max(3.2, 0.55 * n + 1.6), 0 if len(jacobians) == 1 else -(-len(order) // 2)
-    figure = pyplot().figure(figsize=(11.2, height + 2.6 * rows + 0.8), layout="constrained")
-    parts = figure.subfigures(2, 1, height_ratios=(height, 2.6 * rows)) if rows else [figure]
-    left, right = parts[0].subplots(1, 2)
-    font = {"size": 11 if n <= 6 else 8}
-    draw_map(left, examination, examination.information.correlation, space.free_names, "correlation of estimates",
-             vmin=-1, vmax=1, cmap="vlag", annot=True, fmt=".2f", annot_kws=font, square=True)  # fmt: skip
-    axes = list(parts[1].subplots(rows, 2, squeeze=False).flat) if rows else [right]
-    if rows:
-        # how much of the information on each parameter comes from each record
-        squares = np.array([np.sum(j**2, axis=0) for j in jacobians])
-        shares = 100 * squares / np.where(squares.sum(axis=0) > 0.0, squares.sum(axis=0), 1.0)
-        files = [r.name.replace(".csv", "") for r in replays]
-        draw_map(right, examination, shares, files, "share of the information [%]", vmin=0, vmax=100, cmap="Blues",
-                 fmt=".0f", annot=len(files) <= 14, annot_kws={"size": 11 if len(files) <= 8 else 8})  # fmt: skip
+    order, several = telling(examination, jacobians), len(jacobians) > 1
+    figure, axes = panels(len(order) + several, 2, 5.6 if several else 7.2, 3.6)
     for axis, i in zip(axes, order, strict=False):
         draw_sensitivities(axis, examination, i, jacobians[i])
-    for axis in axes[len(order) :]:
-        axis.set_visible(False)
-    parts[-1].legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=min(n, 6), frameon=False)
-    figure.suptitle(fill(f"{title(examination)}: what the records see", 2 * LINE_WIDTH), fontsize="large")
+    if several:
+        draw_shares(axes[-1], examination, jacobians)
+    legend_below(figure, min(len(space.free_names), 6 if several else 4))
+    entitle(figure, f"{title(examination)}: what the records see", "large")
     return figure
 
 
@@ -451,12 +414,17 @@ def telling(examination: Examination, jacobians: list[Array]) -> list[int]:
     return list(seen.values())[:MOST_RECORDS_SHOWN]
 
 
-def draw_map(axis: Any, examination: Examination, values: Array, rows: Sequence[str], label: str, **looks: Any) -> None:
-    """Draw a map with numbers, (n_rows, n_free), names turned so that the longest stays off its neighbours."""
+def draw_shares(axis: Any, examination: Examination, jacobians: list[Array]) -> None:
+    """Draw how much of the information on each parameter comes from each record, as a map with numbers."""
     import seaborn as sns
 
-    names = examination.space.free_names
-    sns.heatmap(values, xticklabels=names, yticklabels=rows, cbar_kws={"label": label}, ax=axis, **looks)
+    names, files = examination.space.free_names, [r.name.replace(".csv", "") for r in examination.replays]
+    squares = np.array([np.sum(j**2, axis=0) for j in jacobians])
+    shares = 100 * squares / np.where(squares.sum(axis=0) > 0.0, squares.sum(axis=0), 1.0)
+    sns.heatmap(shares, xticklabels=names, yticklabels=files, cbar_kws={"label": "share of the information [%]"},
+                ax=axis, vmin=0, vmax=100, cmap="Blues", fmt=".0f", annot=len(files) <= 14,
+                annot_kws={"size": 11 if len(files) <= 8 else 8})  # fmt: skip
+    # turned so that the longest name stays off its neighbours
     axis.tick_params(axis="both", labelrotation=0, length=0)
     if max(len(n) for n in names) > 8 or len(names) > 8:
         axis.set_xticklabels(names, rotation=30, ha="right", rotation_mode="anchor")
