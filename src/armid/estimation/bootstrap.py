@@ -137,14 +137,11 @@ class Task:
         drawn = [coloured(rng, (n_draws, r.record.n_samples), level)
                  for r, level in zip(self.replays, self.levels, strict=True)]  # fmt: skip
         noise = np.concatenate(drawn, axis=1)
-        for change in self.changes_of_starts():
+        records = WeightedRecords(self.replays, self.space, (1.0,) * len(self.replays))
+        # what one standard deviation of each measured start does to the signals
+        for change in start_changes(records, records.shares(self.x)):
             noise += rng.standard_normal((n_draws, 1)) * change
         return np.concatenate([self.measured[np.newaxis], clean + self.beyond_starts(noise)])
-
-    def changes_of_starts(self) -> list[Array]:
-        """Return what one standard deviation of each measured start does to the signals, (n_samples,) each."""
-        records = WeightedRecords(self.replays, self.space, (1.0,) * len(self.replays))
-        return list(start_changes(records, records.shares(self.x)))
 
     def beyond_starts(self, noise: Array) -> Array:
         """Return noise without the part that fitted starts take up."""

@@ -14,7 +14,7 @@ import numpy as np
 from armid.estimation.least_squares import LeastSquaresProblem
 from armid.model import Array, Manoeuvre, Plant
 from armid.problem.problem import Replay, signals_of, with_each
-from armid.record import Piece, Record
+from armid.record import Record
 
 # Relative step of the differences.
 CONSTANT_STEP = 1e-4
@@ -53,16 +53,14 @@ class Product:
 
 
 def moved_record(record: Record, plant: Plant, shares: Mapping[str, float]) -> Record:
-    return record.with_pieces(lambda piece: moved_piece(piece, plant, shares)) if shares else record
+    if not shares:
+        return record
+    return record.with_pieces(lambda p: p.with_constants(moved_constants(p.manoeuvre, plant, shares)))
 
 
 def moved_replays(replays: Sequence[Replay], shares: Mapping[str, float]) -> tuple[Replay, ...]:
     """Return replays with constants moved."""
     return with_each(replays, lambda r: replace(r, record=moved_record(r.record, r.model.plant, shares)))
-
-
-def moved_piece(piece: Piece, plant: Plant, shares: Mapping[str, float]) -> Piece:
-    return piece.with_constants(moved_constants(piece.manoeuvre, plant, shares))
 
 
 def moved_constants(manoeuvre: Manoeuvre, plant: Plant, shares: Mapping[str, float]) -> dict[str, float]:

@@ -114,8 +114,8 @@ def corrections_of_sizes(plant: Plant, record: Record) -> Iterator[Correction]:
                 yield Correction(kind, factor, f"the measured {signal}: {words}",
                            of_signals(plant, [one.output], lambda x, by=factor: [by * x], factor))  # fmt: skip
         for name in (i.name for i in plant.inputs if not units):
-            yield Correction("input", factor, f"input '{name}': {words}",
-                       of_pieces(partial(with_input, name=name, factor=factor)))  # fmt: skip
+            yield Correction("input", factor, f"input '{name}': {words}", of_pieces(
+                lambda p, n=name, by=factor: p.with_inputs({n: by * p.manoeuvre.inputs[n]})))  # fmt: skip
     for factor, words in TIME_FACTORS.items():
         yield Correction("time", factor, words, partial(with_interval, plant=plant, factor=factor))
 
@@ -216,11 +216,6 @@ def start_of(record: Record, piece: Piece, plant: Plant, factor: float) -> dict[
     return state_shown(plant, given, tracks, piece.manoeuvre.interval, piece.start_index)[0]
 
 
-def with_input(piece: Piece, name: str, factor: float) -> Piece:
-    inputs = {n: factor * v if n == name else v for n, v in piece.manoeuvre.inputs.items()}
-    return replace(piece, manoeuvre=replace(piece.manoeuvre, inputs=inputs))
-
-
 def moved(record: Record, seconds: float) -> Record:
     """Return a record whose measured signals come earlier by some time (later where negative); what is lost goes.
 
@@ -228,8 +223,13 @@ def moved(record: Record, seconds: float) -> Record:
     would lose nearly all samples stays as it is.
     """
     shift = round(seconds / record.manoeuvre.interval)
+
+    def driven_later(piece: Piece) -> Piece:
+        rows = np.clip(np.arange(piece.manoeuvre.n_samples) - shift, 0, piece.manoeuvre.n_samples - 1)
+        return piece.with_inputs({name: values[rows] for name, values in piece.manoeuvre.inputs.items()})
+
     if record.manoeuvre.inputs:
-        return record.with_pieces(partial(driven_later, shift=shift))
+        return record.with_pieces(driven_later)
     earlier, pieces = {s.output: s.measured.copy() for s in record.signals}, []
     for piece in record.pieces:
         begin, end = max(piece.window.start, -shift), min(piece.window.stop, piece.manoeuvre.n_samples - shift)
@@ -240,12 +240,6 @@ def moved(record: Record, seconds: float) -> Record:
             own[:] = np.roll(own, -shift)
         pieces.append(replace(piece, window=slice(begin, end)).until_window_end())
     return replace(record.with_measured(earlier), pieces=tuple(pieces))
-
-
-def driven_later(piece: Piece, shift: int) -> Piece:
-    n, inputs = piece.manoeuvre.n_samples, piece.manoeuvre.inputs
-    rows = np.clip(np.arange(n) - shift, 0, n - 1)
-    return replace(piece, manoeuvre=replace(piece.manoeuvre, inputs={k: v[rows] for k, v in inputs.items()}))
 
 
 def rms(values: Array) -> float:

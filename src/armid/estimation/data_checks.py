@@ -6,9 +6,8 @@ of mistakes is undone in turn, and one is named only where that takes away most 
 """
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import combinations
 
 import numpy as np
@@ -93,7 +92,10 @@ def data_issues(campaign: Campaign, model: Model, space: Space) -> tuple[DataIss
                    if s.after * AS_GOOD < least_nearby(trial, train, r, z)]  # fmt: skip
         worst = int(np.argmax(errors))
         if not issues and LEFT < errors[worst] < np.inf:
-            issues = [beyond(train[worst].file, float(errors[worst]))]
+            file = train[worst].file
+            issues = [DataIssue("unjudged", file, f"{file}: the declared model, fitted to the train records, misses it "
+                                f"by {errors[worst]:.3g} times its signal, and no other sign, unit, clock or manoeuvre "
+                                "explains that: the record or the model may be wrong.")]  # fmt: skip
     issues += () if issues else begun_elsewhere(trial, train, z)
     files = {s.record for s in issues if s.kind == "time"}
     return (*seen, *(s for s in times if not files & {"", s.record}), *issues)
@@ -248,7 +250,9 @@ def mistakes(trial: Trial, train: Sequence[Record]) -> tuple[list[DataIssue], Ar
     issues = exchanged(trial, train, outside, before) or [s for r in outside for s in apart(trial, r, z, typical)]
     if not issues and not everywhere and trial.model.plant.from_rest:
         # a driven machine drifts away from a model without friction
-        issues = [unlike(r.file, e) for r, e in zip(train, errors, strict=True)
+        issues = [DataIssue("unlike", r.file, f"{r.file}: the declared model explains nothing of it, whatever its "
+                            f"parameters (error {e:.3g} of the signal), and no other sign, unit, clock or manoeuvre "
+                            "that was tried does.") for r, e in zip(train, errors, strict=True)
                   if NOTHING_GAINED < e < np.inf and trial.likeness(r) < UNLIKE]  # fmt: skip
     return issues or everywhere, z
 
@@ -353,18 +357,6 @@ def chosen(record: str, before: float, tried: Iterable[tuple[float, Correction]]
     return [replace(first, sentence=f"{first.sentence}{also}")]
 
 
-def unlike(file: str, error: float) -> DataIssue:
-    said = (f"{file}: the declared model explains nothing of it, whatever its parameters (error {error:.3g} of the "
-            "signal), and no other sign, unit, clock or manoeuvre that was tried does.")  # fmt: skip
-    return DataIssue("unlike", file, said)
-
-
-def beyond(file: str, error: float) -> DataIssue:
-    said = (f"{file}: the declared model, fitted to the train records, misses it by {error:.3g} times its signal, and "
-            "no other sign, unit, clock or manoeuvre explains that: the record or the model may be wrong.")  # fmt: skip
-    return DataIssue("unjudged", file, said)
-
-
 def exchanged(trial: Trial, train: Sequence[Record], outside: Sequence[Record], before: float) -> list[DataIssue]:
     """Return the two records that each fit the manoeuvre of the other, none where no exchange explains much."""
     tried = []
@@ -382,15 +374,13 @@ def told_as(other: Record) -> Correction:
     constants = {n: v for n, v in manoeuvre.constants.items() if not n.startswith("start_")}
     what = "inputs" if manoeuvre.inputs else "manoeuvre"
     words = f"it and {other.file} look exchanged: each with the {what} of the other"
-    undo = of_pieces(partial(driven_as, constants=constants, inputs=manoeuvre.inputs))
-    return Correction("exchanged", np.nan, words, undo, other.file)
 
+    def driven_as(piece: Piece) -> Piece:
+        n = min([piece.window.stop, *map(len, manoeuvre.inputs.values())])
+        shorter = replace(piece.with_constants(constants), window=slice(piece.window.start, n)).until_window_end()
+        return shorter.with_inputs({name: values[:n] for name, values in manoeuvre.inputs.items()})
 
-def driven_as(piece: Piece, constants: Mapping[str, float], inputs: Mapping[str, Array]) -> Piece:
-    told = piece.with_constants(constants)
-    n = min([piece.window.stop, *map(len, inputs.values())])
-    shorter = replace(told, window=slice(piece.window.start, n)).until_window_end()
-    return replace(shorter, manoeuvre=replace(shorter.manoeuvre, inputs={k: v[:n] for k, v in inputs.items()}))
+    return Correction("exchanged", np.nan, words, of_pieces(driven_as), other.file)
 
 
 def most_samples(n_records: int) -> int:

@@ -231,17 +231,8 @@ def remarks(examination: Examination) -> list[str]:
         said.append(f"The tolerances of the constants counted, the deviations are: {', '.join(deviations)}.")
     said += point_remarks(examination) + level_remarks(examination)
     if examination.offers:
-        return [*said, offer_sentence(examination, examination.offers[0])]
+        return [*said, offer_text(examination, examination.offers[0])]
     return [*said, "No further manoeuvre was found that the machine could make."]
-
-
-def offer_sentence(examination: Examination, offer: Offer) -> str:
-    name = examination.space.free_names[offer.best]
-    text = offer_text(examination, offer)
-    if text.endswith(f"to {UNDETERMINED}"):
-        return (f"No further record that this machine can make determines {name}: fix it, or one of those that move "
-                "with it.")  # fmt: skip
-    return f"One more record, {text}."
 
 
 def group_remark(examination: Examination, group: Group) -> str:
@@ -321,7 +312,10 @@ def level_text(level: Level, unit: str, noise: float) -> str:
 def offer_text(examination: Examination, offer: Offer) -> str:
     name, p = list(entries_of(examination).items())[offer.best]
     before, after = (deviation_text(name, p, float(d[offer.best])) for d in (offer.before, offer.after))
-    return f"{offer.feasible.name}: {name} from {before} to {after}"
+    if after == UNDETERMINED:
+        return (f"No further record that this machine can make determines {name}: fix it, or one of those that move "
+                "with it.")  # fmt: skip
+    return f"One more record, {offer.feasible.name}: {name} from {before} to {after}."
 
 
 CURVE, QUADRATIC, LIMIT = OKABE_ITO["blue"], OKABE_ITO["vermilion"], OKABE_ITO["black"]

@@ -298,13 +298,12 @@ def identified(
         signals, measured = signals_of(seen, space.complete(x[np.newaxis])), [r.measured for r in seen]
         value = float(fitness_of(fitness, seen, measured, signals, weights_of(fitness, seen), output_sizes(seen))[0])
     candidate = space.complete(x[np.newaxis])[0]
-    errors = campaign_errors(train, candidate)
-    assert errors is not None
     information, scatter = judged(fitness, seen, space, x, seed, progress, interval and stopped != WAS_INTERRUPTED)
     trace = meter.trace()
     return Identification(
         campaign, model, space, fitness, identifier.name, candidate, value, information,
-        errors, campaign_errors(holdout, candidate), (trace.evaluation, trace.value), train, holdout,
+        campaign_errors(train, candidate), campaign_errors(holdout, candidate) if holdout else None,
+        (trace.evaluation, trace.value), train, holdout,
         meter.budget, meter.used, meter.n_failed, int(seed), stopped, meter.log().X[trace.evaluation - 1],
         scatter=scatter,
     )  # fmt: skip
@@ -401,9 +400,7 @@ def record_errors(replay: Replay, candidate: Array) -> Errors:
     return Errors(np.sqrt(square), nrmse, chi2, s, s1, s2, replay.record.unit, float(np.ptp(measured)))
 
 
-def campaign_errors(replays: Sequence[Replay], candidate: Array) -> JointErrors | None:
-    if not replays:
-        return None
+def campaign_errors(replays: Sequence[Replay], candidate: Array) -> JointErrors:
     plant = replays[0].model.plant
     groups = [(o, [r for r in replays if r.place == i]) for i, o in enumerate(plant.outputs)]
     outputs = {o.name: output_errors(group, candidate) for o, group in groups if group}
@@ -448,8 +445,7 @@ def entries_of_noise(replays: Sequence[Replay], noise: Sequence[float], candidat
 
 def errors_by_file(replays: Sequence[Replay], candidate: Array) -> dict[str, JointErrors]:
     files = dict.fromkeys(r.record.file for r in replays)
-    by_file = {file: campaign_errors([r for r in replays if r.record.file == file], candidate) for file in files}
-    return {file: errors for file, errors in by_file.items() if errors is not None}
+    return {file: campaign_errors([r for r in replays if r.record.file == file], candidate) for file in files}
 
 
 @contextmanager

@@ -152,6 +152,16 @@ def start_changes(records: LeastSquaresProblem, z: Array, bent: bool = False) ->
     doubt (Julier, Uhlmann 2004, doi:10.1109/JPROC.2003.823141).
     """
     candidate = records.whole(z[np.newaxis])
+
+    def change_of_piece(outputs: Sequence[Replay], index: int, response: Array) -> Array:
+        """Return the change of the weighted signal where outputs of one piece of their record change so."""
+        changes = [np.zeros(r.record.n_samples) for r in records.replays]
+        for change, r in zip(changes, records.replays, strict=True):
+            if r in outputs:
+                first = sum(r.record.lengths[:index])
+                change[first : first + r.record.lengths[index]] = response[r.place, r.record.samples[index]]
+        return records.weighted(changes)
+
     for ready, outputs in by_record(records.replays).items():
         for index, (piece, calibration) in enumerate(zip(ready.record.pieces, ready.calibrations, strict=True)):
             for name, deviation in ({} if piece.shown_start else piece.start_deviation).items():
@@ -161,24 +171,9 @@ def start_changes(records: LeastSquaresProblem, z: Array, bent: bool = False) ->
                     simulate(ready.model, piece.with_constants({name: start + move}).manoeuvre, candidate,
                              calibration.schedule).outputs[:, 0] for move in moves
                 )  # fmt: skip
-                yield change_of_piece(records, outputs, index, 0.5 * (above - below))
+                yield change_of_piece(outputs, index, 0.5 * (above - below))
                 for same in at:
-                    yield change_of_piece(records, outputs, index, 0.5 * (above + below) - same)
-
-
-def change_of_piece(
-    records: LeastSquaresProblem, outputs: Sequence[Replay], index: int, response: Array
-) -> Array:  # fmt: skip
-    """Return the change of the weighted signal where one piece of one record changes, (n_samples,).
-
-    outputs: of that record. index: of the piece. response: change of its outputs, (n_outputs, n_times).
-    """
-    changes = [np.zeros(r.record.n_samples) for r in records.replays]
-    for change, r in zip(changes, records.replays, strict=True):
-        if r in outputs:
-            first = sum(r.record.lengths[:index])
-            change[first : first + r.record.lengths[index]] = response[r.place, r.record.samples[index]]
-    return records.weighted(changes)
+                    yield change_of_piece(outputs, index, 0.5 * (above + below) - same)
 
 
 def inverse(matrix: Array) -> Array:

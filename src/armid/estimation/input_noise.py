@@ -144,13 +144,9 @@ def estimated(record: Record, noise: Mapping[str, InputNoise]) -> Record:
             return piece
         inputs = {name: piece.manoeuvre.inputs[name] for name in noise}
         found = {name: smoothed(u, noise[name], at_rest(record, piece, u)) for name, u in inputs.items()}
-        return with_inputs(replace(piece, smoothed=found), {name: one.values for name, one in found.items()})
+        return replace(piece, smoothed=found).with_inputs({name: one.values for name, one in found.items()})
 
     return record.with_pieces(driven)
-
-
-def with_inputs(piece: Piece, inputs: Mapping[str, Array]) -> Piece:
-    return replace(piece, manoeuvre=replace(piece.manoeuvre, inputs={**piece.manoeuvre.inputs, **inputs}))
 
 
 def answers(
@@ -220,7 +216,7 @@ def with_changes(record: Record, name: str, changes: Sequence[Array]) -> Record:
     """Return a record with changes of an input, of each piece one that is as long or longer."""
     pairs = zip(record.pieces, changes, strict=True)
     pieces = ((piece, piece.manoeuvre.inputs[name], change) for piece, change in pairs)
-    return replace(record, pieces=tuple(with_inputs(p, {name: u + change[: u.size]}) for p, u, change in pieces))
+    return replace(record, pieces=tuple(p.with_inputs({name: u + change[: u.size]}) for p, u, change in pieces))
 
 
 def moved_by_inputs(replays: Sequence[Replay], candidate: Array) -> dict[str, float]:

@@ -64,9 +64,7 @@ class Residuals:
 
     @cached_property
     def errors(self) -> JointErrors:
-        errors = campaign_errors(self.judged, self.candidate)
-        assert errors is not None
-        return errors
+        return campaign_errors(self.judged, self.candidate)
 
     @cached_property
     def diagnosis(self) -> "Diagnosis":

@@ -291,7 +291,8 @@ def errors_on(records: tuple[Record, ...], judged: Judgement, library: Library) 
     """Return the errors of a model on records as they were read."""
     fit = judged.fit
     moved = [moved_record(r, library.declared.plant, fit.constants) for r in records]
-    return campaign_errors(calibrated_replays(moved, fit.model, fit.records.space, fit.values), fit.candidate)
+    replays = calibrated_replays(moved, fit.model, fit.records.space, fit.values)
+    return campaign_errors(replays, fit.candidate) if replays else None
 
 
 # Manoeuvres that are listed, and models that one has to tell apart.

@@ -98,6 +98,10 @@ class Piece:
         """Return the piece with other constants of its manoeuvre, SI."""
         return replace(self, manoeuvre=replace(self.manoeuvre, constants={**self.manoeuvre.constants, **constants}))
 
+    def with_inputs(self, inputs: Mapping[str, Array]) -> "Piece":
+        """Return the piece with other values of inputs, (n_samples,) each."""
+        return replace(self, manoeuvre=replace(self.manoeuvre, inputs={**self.manoeuvre.inputs, **inputs}))
+
     def of(self, samples: NDArray[Any]) -> NDArray[Any]:
         """Return the samples of the piece out of those of the whole record."""
         return samples[self.start_index : self.start_index + self.manoeuvre.n_samples]
