@@ -10,9 +10,9 @@ import numpy as np
 from armid.errors import ArmidError, nearest, quoted
 from armid.model import Array, Manoeuvre, ManoeuvreKey, Plant
 from armid.record.record import Piece, Record, Signal
-from armid.record.resample import Timing, onto_grid, piece_length, timing_of, with_window
+from armid.record.resample import onto_grid, piece_length, timing_of, with_window
 from armid.record.schema import CampaignSheet, KindError, RecordSheet, number
-from armid.record.sensor import InputNoise, noise_of_input
+from armid.record.sensor import InputNoise, in_runs, noise_of_input
 from armid.record.signal import signal_of
 from armid.record.start import Track, n_spent, state_at, state_shown, track_of
 from armid.record.table import (
@@ -42,23 +42,28 @@ def record_of(table: CsvTable, sheet: RecordSheet, campaign: CampaignSheet, plan
     times = time_column(table)
     plant, outputs = output_columns(table, plant)
     timing = timing_of(times, plant.from_rest, table.file)
-    sources = input_columns(plant, {**campaign.inputs, **sheet.inputs}, table, where)
-    driven = [table.numbers(header) for header in sources.values()]
+    sources, hold = input_columns(plant, {**campaign.inputs, **sheet.inputs}, table, where), sheet.hold or campaign.hold
+    driven = {i.name: table.numbers(sources[i.name]) * input_factor(sources[i.name], i.unit, table)
+              for i in plant.inputs if i.name in sources}  # fmt: skip
+    most_lost = campaign.most_lost if sheet.most_lost is None else sheet.most_lost
 
     def read(header: str, factor: float, unit: str, output: str = "") -> tuple[Signal, Array]:
-        most_lost = campaign.most_lost if sheet.most_lost is None else sheet.most_lost
-        return signal_of(table, header, unit, factor, times, timing, driven, campaign.unwrap, most_lost, output)
+        inputs = list(driven.values())
+        return signal_of(table, header, unit, factor, times, timing, inputs, campaign.unwrap, most_lost, output)
 
     measured = [read(header, o.factors[header], o.unit, o.name) for o, header in outputs.items()]
     if campaign.gyro_range_deg_s is not None:
         check_range(measured, campaign.gyro_range_deg_s, table)
     others = {name: values for name, values in table.columns.items() if name not in (TIME_HEADER, *outputs.values())}
     columns = {name: onto_grid(values, times, timing) for name, values in others.items() if np.isfinite(values).all()}
-    manoeuvre = manoeuvre_of(plant, campaign, sheet, table, timing, sources, where=where)
+    inputs = {i.name: onto_grid(driven[i.name], times, timing, i.hold or hold) if i.name in driven
+              else np.full(timing.n_samples, i.default) for i in plant.inputs}  # fmt: skip
+    constants = record_constants(plant, campaign.constants, sheet, where)
+    noises = {name: noise_of_input(u, [(y, s.is_speed) for s, y in measured]) for name, u in driven.items()}
     record = Record(
         file=sheet.file,
         role=sheet.role,
-        manoeuvre=manoeuvre,
+        manoeuvre=Manoeuvre(timing.interval, timing.n_samples, constants, inputs, hold, timing.start),
         signals=tuple(signal for signal, _ in measured),
         pieces=(),
         whole_pieces=(),
@@ -67,44 +72,10 @@ def record_of(table: CsvTable, sheet: RecordSheet, campaign: CampaignSheet, plan
         repeat_of=sheet.repeat_of or "",
         restart_s=sheet.restart_s,
         irregularity=timing.irregularity,
-        input_noise=input_noises(plant, table, sources, measured),
+        input_noise={name: noise for name, noise in noises.items() if noise != InputNoise()},
     )
     tracks = {} if plant.from_rest else tracks_of(record, plant, table, lambda *what: read(*what)[0])
     return with_window(started(record, plant, tracks, where), sheet.window_s, f"{where}, window_s")
-
-
-def manoeuvre_of(
-    plant: Plant, campaign: CampaignSheet, sheet: RecordSheet, table: CsvTable, timing: Timing,
-    sources: Mapping[str, str], *, where: str,
-) -> Manoeuvre:  # fmt: skip
-    """Return the manoeuvre of a whole record, still without the measured state at its start.
-
-    sources: input -> header of its column.
-    """
-    constants = record_constants(plant, campaign.constants, sheet, where)
-    hold = sheet.hold or campaign.hold
-    inputs = {}
-    for driven in plant.inputs:
-        header = sources.get(driven.name)
-        if header is None:
-            inputs[driven.name] = np.full(timing.n_samples, driven.default)
-        else:
-            values = table.numbers(header) * input_factor(header, driven.unit, table)
-            inputs[driven.name] = onto_grid(values, table.columns[TIME_HEADER], timing, driven.hold or hold)
-    return Manoeuvre(timing.interval, timing.n_samples, constants, inputs, hold, timing.start)
-
-
-def input_noises(
-    plant: Plant, table: CsvTable, sources: Mapping[str, str], measured: Sequence[tuple[Signal, Array]]
-) -> dict[str, InputNoise]:  # fmt: skip
-    """Return the noise of each input that was measured with some, SI; sources: input -> header of its column."""
-    outputs, noises = [(values, signal.is_speed) for signal, values in measured], {}
-    for driven in plant.inputs:
-        header = sources.get(driven.name)
-        if header is not None:
-            factor = input_factor(header, driven.unit, table)
-            noises[driven.name] = noise_of_input(table.numbers(header) * factor, outputs)
-    return {name: noise for name, noise in noises.items() if noise != InputNoise()}
 
 
 def input_factor(header: str, unit: str, table: CsvTable) -> float:
@@ -128,8 +99,7 @@ def check_range(measured: Sequence[tuple[Signal, Array]], range_deg_s: float, ta
     step = min(speed.sensor.step, gyro_range / 100)
     # the slack keeps a value that is one step below the range inside, whatever its last binary digit
     near = np.abs(values) >= gyro_range - step * (1 + 1e-6)
-    runs = np.convolve(near, np.ones(SATURATED_SAMPLES), mode="valid")
-    saturated = np.flatnonzero(runs > SATURATED_SAMPLES - 0.5)
+    saturated = np.flatnonzero(in_runs(near, SATURATED_SAMPLES))
     if saturated.size:
         row = int(saturated[0])
         raise ArmidError(f"{table.file}, line {table.line_of(row)}: {SATURATED_SAMPLES} samples in a row are at the "

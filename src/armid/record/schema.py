@@ -66,11 +66,15 @@ def number(value: object) -> float:
     raise KindError(value)
 
 
-@kind(type="string")
-def any_text(value: object) -> str:
-    if isinstance(value, str):
-        return value
-    raise KindError(value)
+def instance_of(python: type, schema: str) -> Kind:
+    """Return the kind of all values of a type of Python; schema: its name in JSON Schema."""
+
+    def read(value: object) -> Any:
+        if isinstance(value, python):
+            return value
+        raise KindError(value)
+
+    return Kind(read, {"type": schema})
 
 
 def tested(kind: Kind, test: Callable[[Any], bool], **schema: Any) -> Kind:
@@ -85,6 +89,8 @@ def tested(kind: Kind, test: Callable[[Any], bool], **schema: Any) -> Kind:
     return Kind(both, {**kind.schema, **schema})
 
 
+any_text, boolean = instance_of(str, "string"), instance_of(bool, "boolean")
+any_table = instance_of(dict, "object")
 above_zero = tested(number, lambda value: value > 0.0, exclusiveMinimum=0)
 share = tested(number, lambda value: 0.0 <= value < 1.0, minimum=0, exclusiveMaximum=1)
 probability = tested(number, lambda value: 0.0 < value < 1.0, exclusiveMinimum=0, exclusiveMaximum=1)
@@ -94,20 +100,6 @@ text = tested(any_text, bool, minLength=1)
 def name_in(catalogue: str) -> Kind:
     """Return the kind of names of a catalogue; JSON Schema offers those that are registered and takes others."""
     return Kind(text.read, {**text.schema, REGISTERED: catalogue})
-
-
-@kind(type="boolean")
-def boolean(value: object) -> bool:
-    if isinstance(value, bool):
-        return value
-    raise KindError(value)
-
-
-@kind(type="object")
-def any_table(value: object) -> dict[str, Any]:
-    if isinstance(value, dict):
-        return value
-    raise KindError(value)
 
 
 def one_of(*words: str) -> Kind:

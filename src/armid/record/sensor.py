@@ -264,9 +264,8 @@ def rest_between(values: Array, still: Mask, is_speed: bool) -> Array:
     A stick of friction under drive is not a rest: the inputs are still, too. values: (n_rows,). still: where no input
     changes, (n_rows,). is_speed: whether a value of 0 tells a standstill, else any that stays does.
     """
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8)))
     longest = np.empty(0)
-    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+    for begin, end in stretches(still):
         for part in range(HALVINGS):
             rest = values[end - (end - begin) // 2**part : end]
             if rest.size < max(FEWEST_REST_SAMPLES, longest.size + 1):
@@ -455,11 +454,11 @@ def repeated_samples(values: Array, noise: float, known: bool, sensor: Sensor, s
     leap = max(ABOVE_NOISE * noise, LEAP * float(np.quantile(np.abs(np.diff(values)), USUAL)))
     repeated = runs(values)
     for limit in (float(values.max()), float(values.min())):
-        stretches = visits(values, limit) if abs(limit) > sensor.step else []
+        visited = visits(values, limit) if abs(limit) > sensor.step else []
         longest = max((end - begin for begin, end in repeated if values[begin] == limit), default=0)
         # noise leaves a limit for some samples where the signal reaches it; a frozen sensor has one run
         in_noise = known and int(np.sum(values == limit)) > longest
-        if longest and any(in_noise or is_abrupt(values, *stretch, ABRUPT * usual) for stretch in stretches):
+        if longest and any(in_noise or is_abrupt(values, *stretch, ABRUPT * usual) for stretch in visited):
             clipped |= values == limit
     by_chance = longest_by_chance(noise, sensor.step, values.size)
     for begin, end in repeated:
@@ -502,9 +501,7 @@ def is_abrupt(values: Array, begin: int, end: int, least: float) -> bool:
 
 def runs(values: Array, shortest: int = REPEATED) -> list[tuple[int, int]]:
     """Return first row and end of the runs of equal values that are so long or longer."""
-    edges = np.concatenate([[0], np.flatnonzero(np.diff(values) != 0.0) + 1, [values.size]])
-    long = np.flatnonzero(np.diff(edges) >= shortest)
-    return list(zip(edges[long].tolist(), edges[long + 1].tolist(), strict=True))
+    return [(begin, end + 1) for begin, end in stretches(np.diff(values) == 0.0) if end + 1 - begin >= shortest]
 
 
 def wild_samples(values: Array, noise: float) -> Mask:
@@ -548,8 +545,13 @@ def after_sudden(values: Array) -> Mask:
 
 def in_runs(true: Mask, shortest: int) -> Mask:
     """Return the runs of a mask that are so long or longer."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], true, [False]]).astype(np.int8)))
     mask = np.zeros(true.size, dtype=np.bool_)
-    for begin, end in zip(edges[::2], edges[1::2], strict=True):
+    for begin, end in stretches(true):
         mask[begin:end] = end - begin >= shortest
     return mask
+
+
+def stretches(true: Mask) -> list[tuple[int, int]]:
+    """Return first row and end of each run of a mask."""
+    edges = np.flatnonzero(np.diff(true, prepend=False, append=False))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True))

@@ -4,6 +4,7 @@ import warnings
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from armid.errors import ArmidError
 from armid.model import Array
@@ -41,8 +42,8 @@ WRAPS = {"rad": (2.0 * np.pi,), "deg": (360.0,), "turns": (1.0,), "counts": (2.0
 
 
 def signal_of(
-    table: CsvTable, header: str, unit: str, factor: float, times: Array, timing: Timing, inputs: Sequence[Array] = (),
-    unwrap: bool = False, most_lost: float = 0.05, output: str = "",
+    table: CsvTable, header: str, unit: str, factor: float, times: Array, timing: Timing, inputs: Sequence[Array],
+    unwrap: bool, most_lost: float, output: str,
 ) -> tuple[Signal, Array]:  # fmt: skip
     """Return the signal of a column of a file, and the column, SI, (n_rows,); warn of what of it is not data.
 
@@ -61,24 +62,19 @@ def signal_of(
     if sensor.hold > 1:
         warn(table, f"{header} is renewed every {sensor.hold} rows: one sample of each renewal counts")
     check_number(table, header, rows, timing)
-    n_new, masks = int(rows.sum()), {}
+    n_new = int(rows.sum())
     jumps = np.cumsum(np.any([after_sudden(x) for x in inputs], axis=0)) if inputs else np.zeros(values.size)
     new = New(values, rows, times, timing)
     wild = wild_samples(new.values, max(difference_rms(new.motion, new.uneven), sensor.step / np.sqrt(12.0)))
-    masks["spikes"] = rows.copy()
-    rows[new.at[wild & ~new.since(jumps)]] = False
-    masks["spikes"] &= ~rows
+    broken = {"spikes": new.at[wild & ~new.since(jumps)]}
+    rows[broken["spikes"]] = False
     new = New(values, rows, times, timing)
     rest, noise = rest_and_noise(new, inputs, is_speed)
-    moves = not is_constant(new.motion)
-    repeated = (
-        repeated_samples(new.values, noise.rms, noise.source == "rest", sensor, new.since(jumps)) if moves else {}
-    )
-    for kind, broken in repeated.items():
-        masks[kind] = np.zeros(rows.size, dtype=np.bool_)
-        masks[kind][new.at[broken]] = True
-        rows[new.at[broken]] = False
-    faults = [lost(table, header, kind, mask, times, timing.first) for kind, mask in masks.items() if mask.any()]
+    if not is_constant(new.motion):
+        repeated = repeated_samples(new.values, noise.rms, noise.source == "rest", sensor, new.since(jumps))
+        broken |= {kind: new.at[mask] for kind, mask in repeated.items()}
+    rows[np.concatenate([*broken.values()])] = False
+    faults = [lost(table, header, kind, at, times) for kind, at in broken.items() if at.size]
     check_lost(table, header, faults, n_new, most_lost)
     check_number(table, header, rows, timing)
     measured, data = moved_onto_grid(values, times, timing, rows)
@@ -145,8 +141,7 @@ def check_number(table: CsvTable, header: str, rows: Mask, timing: Timing) -> No
                          f"{FEWEST_SAMPLES} are expected")  # fmt: skip
 
 
-def lost(table: CsvTable, header: str, kind: str, mask: Mask, times: Array, first: int) -> Broken:
-    at = np.flatnonzero(mask)
+def lost(table: CsvTable, header: str, kind: str, at: NDArray[np.intp], times: Array) -> Broken:
     line = table.line_of(int(at[0]))
     if kind == "spikes":
         more = f", and {at.size - 1} more" if at.size > 1 else ""
@@ -166,9 +161,7 @@ def check_lost(table: CsvTable, header: str, faults: Sequence[Broken], n_new: in
 
 def gaps(times: Array, timing: Timing) -> list[Broken]:
     """Return the gaps between rows that are bridged by two samples of the grid or more."""
-    missing = gap_samples(times, timing)
-    missing = in_runs(missing, BRIDGED)
-    at = timing.grid()[missing]
+    at = timing.grid()[in_runs(gap_samples(times, timing), BRIDGED)]
     return [Broken("gap", at.size, float(at[0]), float(at[-1]))] if at.size else []
 
 
