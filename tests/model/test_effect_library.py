@@ -7,7 +7,7 @@ import pytest
 
 from armid.errors import ArmidError
 from armid.model import EFFECTS, PLANTS, Effect, Model, Parameter, applicable, refusal_of
-from armid.model.plants.driven_axis import linear_axis, rotary_axis
+from armid.model.plants.driven_axis import driven_axis, rotary_axis
 
 ARM = PLANTS["shell_transfer_arm"]
 ARM_ONLY = {
@@ -48,7 +48,7 @@ def test_ranges_cover_what_a_real_arm_has_with_room():
         assert p.low <= weak <= p.high, name
 
 
-@pytest.mark.parametrize("axis", [linear_axis, rotary_axis], ids=["linear", "rotary"])
+@pytest.mark.parametrize("axis", [driven_axis, rotary_axis], ids=["linear", "rotary"])
 def test_what_is_not_of_the_arm_alone_fits_an_axis(axis):
     assert set(applicable(EFFECTS, axis)) == set(EFFECTS) - ARM_ONLY - TWO_INERTIAS
     assert set(applicable(EFFECTS, ARM)) == set(EFFECTS) - TWO_INERTIAS
@@ -57,7 +57,7 @@ def test_what_is_not_of_the_arm_alone_fits_an_axis(axis):
 
 
 def test_a_plant_refuses_with_the_name_that_it_lacks():
-    assert "'supply'" in refusal_of(EFFECTS["supply_sag"], linear_axis)
+    assert "'supply'" in refusal_of(EFFECTS["supply_sag"], driven_axis)
     assert "asks for 'l', which nobody offers here" in refusal_of(EFFECTS["seal_friction"], rotary_axis)
     assert refusal_of(EFFECTS["coulomb"], rotary_axis) == ""
 

@@ -12,7 +12,7 @@ from armid.errors import ArmidError
 from armid.inference.candidates import EffectKey, constant_effects
 from armid.model import EFFECTS, PLANTS, Manoeuvre, Model, Scales, applicable
 from armid.model.parameter import warn_if_far
-from armid.model.plants.driven_axis import linear_axis
+from armid.model.plants.driven_axis import driven_axis
 
 PLANT = PLANTS["shell_transfer_arm"]
 
@@ -97,7 +97,7 @@ TIMES = 5e-3 * np.arange(201)
 # Lowering with the shell, the switch at 0.578 s, to 0.75 s; a light hanging axis under a sine that turns it over twice.
 MOTIONS = {
     "arm": (PLANTS["shell_transfer_arm"], Manoeuvre(5e-3, 151), {}),
-    "axis": (linear_axis, Manoeuvre(5e-3, 201, {"gravity_moment": 0.4, "start_speed": 0.1},
+    "axis": (driven_axis, Manoeuvre(5e-3, 201, {"gravity_moment": 0.4, "start_speed": 0.1},
                                     {"u": 0.1 + 0.5 * np.sin(9 * TIMES)}), {"mass": 0.06}),
 }  # fmt: skip
 

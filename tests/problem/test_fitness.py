@@ -14,7 +14,6 @@ from armid.problem.fitness import (  # fmt: skip
     Fitness,
     as_fitness,
     chi_square,
-    joined,
     record_weights,
     relative_mean_square,
 )
@@ -84,10 +83,10 @@ def test_refuses_an_unknown_join() -> None:
         Fitness("mine", lambda measured, simulated: 0, join="durations")
 
 
-@pytest.mark.parametrize("weights", [(1.0, 0.0), (1.0, np.nan), (1.0,), ()])
+@pytest.mark.parametrize("weights", [(1.0, 0.0), (1.0, np.nan)])
 def test_refuses_weights_that_do_not_fit(weights: tuple[float, ...]) -> None:
-    with pytest.raises(ValueError, match=r"weighs records|do not match"):
-        joined(FITNESS["rmse"], np.ones((2, 3)), record_weights(FITNESS["rmse"], (1.0, 1.0), weights))
+    with pytest.raises(ValueError, match="weighs records"):
+        record_weights(FITNESS["rmse"], (1.0, 1.0), weights)
 
 
 def test_likelihood_needs_noise() -> None:

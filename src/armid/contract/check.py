@@ -1,9 +1,7 @@
 """The entrance to all contracts; those of a campaign, of a fitness and of an identifier."""
 
-import random
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -16,6 +14,7 @@ from armid.errors import ArmidError
 from armid.estimation.corrections import DataIssue
 from armid.estimation.data_checks import data_issues
 from armid.identifiers import Identifier, as_identifier
+from armid.identifiers.own import global_generators
 from armid.model import PLANTS, Array, Effect, Model, Plant
 from armid.problem.fitness import Fitness, as_fitness
 from armid.problem.meter import BudgetIgnoredError, Meter, Metered, MeterTermination
@@ -119,11 +118,7 @@ def check_fitness(fitness: Fitness) -> list[ContractPoint]:
         ("finite", np.isfinite(values).all(), f"values {np.array2string(values, precision=3)}"),
         ("least at a perfect match", np.argmin(values) == 0, f"{values[0]:.3g} at the measured series"),
         ("a failed candidate is worst", failed[-1] > values.max(), f"{failed[-1]:.3g} for a NaN row"),
-        (
-            "others untouched",
-            apart,
-            "compared: a candidate alone, and next to a failed one",
-        ),
+        ("others untouched", apart, "compared: a candidate alone, and next to a failed one"),
         ("leaves its arguments alone", untouched, text),
         ("deterministic", np.array_equal(values, again), "a second call is compared with the first"),
     ]
@@ -251,21 +246,9 @@ def run(identifier: Identifier, seed: int, problem: Trial | None = None, noise: 
     """Run an identifier on a trial problem; noise: state of the global generators, which must not matter."""
     trial = Trial(Meter(TRIAL_BUDGET)) if problem is None else problem
     assert trial.meter is not None
-    with disturbed(noise):
+    with global_generators(noise):
         minimize(trial, identifier.build(TRIAL_BUDGET), MeterTermination(trial.meter), seed=seed, copy_algorithm=False)
     return trial.meter, trial
-
-
-@contextmanager
-def disturbed(noise: int) -> Iterator[None]:
-    kept, kept_by_numpy = random.getstate(), np.random.get_state()
-    random.seed(noise)
-    np.random.seed(noise)
-    try:
-        yield
-    finally:
-        random.setstate(kept)
-        np.random.set_state(kept_by_numpy)
 
 
 def difference(one: Meter, other: Meter) -> str:

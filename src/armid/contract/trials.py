@@ -261,13 +261,10 @@ class PlainModel:
 
     def input_at(self, name: str, time: float, inside: float | None = None) -> float:
         """Return an input; inside: a time at which it has the same value where it is held, None: the present sample."""
-        if inside is not None and self.inputs[name] == "zero":
-            place = (inside - self.manoeuvre.start_time) / self.manoeuvre.interval
-            return float(self.manoeuvre.inputs[name][max(int(np.floor(place)), 0)])
-        samples, place = self.manoeuvre.inputs[name], (time - self.manoeuvre.start_time) / self.manoeuvre.interval
+        samples, begin, interval = self.manoeuvre.inputs[name], self.manoeuvre.start_time, self.manoeuvre.interval
         if self.inputs[name] == "zero":
-            return float(samples[self.sample])
-        return float(np.interp(place, np.arange(len(samples)), samples))
+            return float(samples[self.sample if inside is None else max(int(np.floor((inside - begin) / interval)), 0)])
+        return float(np.interp((time - begin) / interval, np.arange(len(samples)), samples))
 
     def rates(self, time: float, states: Array, closed: Latches) -> Array:
         self.n_rates += 1

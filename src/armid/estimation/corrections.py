@@ -106,6 +106,10 @@ def corrections(plant: Plant, record: Record, shift: int) -> Iterator[Correction
         yield Correction("late", seconds, words, partial(moved, seconds=seconds))
 
 
+def scaled_input(piece: Piece, name: str, factor: float) -> Piece:
+    return piece.with_inputs({name: factor * piece.manoeuvre.inputs[name]})
+
+
 def corrections_of_sizes(plant: Plant, record: Record) -> Iterator[Correction]:
     for factor, (kind, units, words) in FACTORS.items():
         for one in record.signals:
@@ -115,7 +119,7 @@ def corrections_of_sizes(plant: Plant, record: Record) -> Iterator[Correction]:
                            of_signals(plant, [one.output], lambda x, by=factor: [by * x], factor))  # fmt: skip
         for name in (i.name for i in plant.inputs if not units):
             yield Correction("input", factor, f"input '{name}': {words}", of_pieces(
-                lambda p, n=name, by=factor: p.with_inputs({n: by * p.manoeuvre.inputs[n]})))  # fmt: skip
+                partial(scaled_input, name=name, factor=factor)))  # fmt: skip
     for factor, words in TIME_FACTORS.items():
         yield Correction("time", factor, words, partial(with_interval, plant=plant, factor=factor))
 

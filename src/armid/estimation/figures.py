@@ -47,7 +47,7 @@ def fit_figure(identification: Identification) -> Any:
         pair[0].set_title(f"{replay.name} ({replay.record.role}), RMSE {rms:.3g} {unit}", fontsize="medium")
         draw_record(pair, {name: (replay.times, y) for name, y in curves.items()}, replay.record.unit)
     figure.legend(*axes[0][0].get_legend_handles_labels(), loc="lower center", ncols=2, frameon=False)
-    there_are = len(identification.train_replays) + len(identification.holdout_replays)
+    there_are = len(identification.replays)
     model = " + ".join([identification.model.plant.name, *(e.name for e in identification.model.effects)])
     some = "" if len(replays) == there_are else f" ({len(replays)} of {there_are} records)"
     search = f"{identification.identifier} on {identification.fitness.name}"

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.errors import ArmidError, quoted
+from armid.errors import ArmidError
 from armid.estimation.bootstrap import Refined, Scatter, bootstrap, without
 from armid.estimation.corrections import DataIssue
 from armid.estimation.information import Information, collinear, information_at
@@ -23,7 +23,7 @@ from armid.estimation.noise_model import MISFIT, level_of
 from armid.identifiers import Identifier, run
 from armid.model import Array, Model
 from armid.problem.fitness import Fitness, chi_square, mean_square
-from armid.problem.meter import LARGEST_BUDGET, BudgetIgnoredError, Meter
+from armid.problem.meter import BudgetIgnoredError, Meter
 from armid.problem.problem import (
     IdentificationProblem,
     Replay,
@@ -174,11 +174,15 @@ class Identification(Result):
             "sensitivities" if scatter is None else "bootstrap", None if scatter is None else float(scatter.bias[k]),
         )  # fmt: skip
 
+    @property
+    def replays(self) -> tuple[Replay, ...]:
+        """All records ready to be simulated, those that were fitted first."""
+        return (*self.train_replays, *self.holdout_replays)
+
     @cached_property
     def outputs(self) -> dict[str, dict[str, Any]]:
         """Output -> its unit, the noise of its records, and how far noise of their inputs moves the model."""
-        replays = (*self.train_replays, *self.holdout_replays)
-        return entries_of_noise(replays, [r.record.noise.rms for r in replays], self.candidate)
+        return entries_of_noise(self.replays, [r.record.noise.rms for r in self.replays], self.candidate)
 
     @cached_property
     def interval_doubts(self) -> dict[str, str]:
@@ -260,9 +264,6 @@ def identify(
         raise ArmidError(f"the seed is {seed!r}, a whole number of at least 0 is expected")
     if target is not None and isinstance(target, int | float) and np.isinf(target):
         raise ArmidError(f"the target is {target}, a finite fitness is expected")
-    if isinstance(budget, int) and budget > LARGEST_BUDGET:
-        # a whole number may have more digits than any float
-        raise ArmidError(f"the budget is {quoted(budget)}, expected at most {LARGEST_BUDGET:,} simulations")
     identifier.refuse(fitness)
     # a bad budget or target, and bad options, are refused before anything is calibrated
     identifier.build(Meter(budget, target).budget)

@@ -177,11 +177,10 @@ def parts_of(identification: Identification) -> Parts:
 def result_of(identification: Identification) -> dict[str, Any]:
     """Return everything of an identification that JSON can hold, SI throughout; what is not known is null."""
     names, correlation = identification.information.names, identification.information.correlation
-    replays = (*identification.train_replays, *identification.holdout_replays)
-    roles = {r.record.file: r.record.role for r in replays}
-    by_file = errors_by_file(replays, identification.candidate)
+    roles = {r.record.file: r.record.role for r in identification.replays}
+    by_file = errors_by_file(identification.replays, identification.candidate)
     noises: dict[str, dict[str, Any]] = {}
-    for noise, r in ((r.record.noise, r) for r in replays):
+    for noise, r in ((r.record.noise, r) for r in identification.replays):
         entry = {"rms": noise.rms, "mean": noise.mean, "source": noise.source}
         noises.setdefault(r.record.file, dict(entry, outputs={}))["outputs"][r.record.output] = entry
     return plain({
@@ -214,19 +213,18 @@ def details_of(identification: Identification) -> dict[str, Any]:
 
     Of long records each curve keeps the samples that `thinned` chooses.
     """
-    replays = (*identification.train_replays, *identification.holdout_replays)
     records = [{
         "file": r.name, "role": r.record.role, "noise_rms": r.record.noise.rms, "unit": r.record.unit,
         "n_samples": len(r.measured),
         "curves": {name: curve_entry(r.times, y) for name, y in curves_of(r, identification.candidate).items()},
-    } for r in replays[:MOST_RECORDS]]  # fmt: skip
+    } for r in identification.replays[:MOST_RECORDS]]  # fmt: skip
     return {
         "remarks": remarks(identification),
         "known_first": ranked(identification)[:MOST_KNOWN_FIRST],
         "warnings": [*(s.sentence for s in identification.issues), *convergence_remarks(identification)],
         "within_tolerances": [f"{name} ({t:.2g})" for name, t in identification.campaign.tolerances.items() if t > 0.0],
         "records": records,
-        "n_records": len(replays),
+        "n_records": len(identification.replays),
         "search": curve_entry(identification.trace[0].astype(float), identification.trace[1]),
     }
 
@@ -252,8 +250,7 @@ def ranked(identification: Identification) -> list[str]:
     if identification.n_failed:
         said.append(f"{identification.n_failed} of {identification.used} candidates diverged and were given a penalty.")
     # that probes elsewhere miss the accuracy says nothing about the estimate
-    replays = (*identification.train_replays, *identification.holdout_replays)
-    coarse = [r for r in replays if not all(c.reached for c in r.calibrations)]
+    coarse = [r for r in identification.replays if not all(c.reached for c in r.calibrations)]
     off = {r: r.engine_error_at(identification.candidate) for r in coarse}
     return said + bootstrap_remarks(identification) + [
         "{}: the engine is off by up to {:.2g} {} at the estimate, even at its finest steps: the equations change too "

@@ -212,8 +212,6 @@ def coloured_level(rests: Sequence[Array], rms: float, n: int) -> NoiseModel:
 
 def yule_walker(covariance: Array, order: int) -> tuple[Array, float]:
     """Return the terms of an autoregression and the variance of its innovations."""
-    if order == 0:
-        return np.empty(0), float(covariance[0])
     terms = np.linalg.solve(toeplitz(covariance[:order]), covariance[1 : order + 1])
     return np.asarray(terms, dtype=np.float64), float(covariance[0] - terms @ covariance[1 : order + 1])
 

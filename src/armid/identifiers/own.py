@@ -5,7 +5,8 @@ import random as python_random
 import threading
 import warnings
 from abc import abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from copy import deepcopy
 from dataclasses import dataclass
 from functools import partial
@@ -189,26 +190,34 @@ class Ngopt(Foreign):
         # nevergrad 1.0.12 makes a number of an array of one, which numpy 2.4 refuses
         vars(metamodel).setdefault("float", lambda number: float(np.asarray(number).item()))
         seed, point = int(random.integers(1, LARGEST_SEED)), ng.p.Array(shape=low.shape, lower=0.0, upper=1.0)
-        point.random_state = np.random.RandomState(seed)
+        point.random_state, before = np.random.RandomState(seed), set(threading.enumerate())
         # some of its methods draw from the global generators all the same
-        state, by_numpy, before = python_random.getstate(), np.random.get_state(), set(threading.enumerate())
-        python_random.seed(seed)
-        np.random.seed(seed)
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")
+        with global_generators(seed), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            try:
                 optimizer = ng.optimizers.registry["NGOpt10"](point, budget=budget)
                 for _ in range(budget):
                     asked = optimizer.ask()
                     optimizer.tell(asked, value(low + asked.value * (high - low)))
-        finally:
-            # some run in threads that wait for their next value
-            for thread in set(threading.enumerate()) - before:
-                if hasattr(thread, "stop"):
-                    thread.stop()
-                    thread.join()
-            python_random.setstate(state)
-            np.random.set_state(by_numpy)
+            finally:
+                # some run in threads that wait for their next value
+                for thread in set(threading.enumerate()) - before:
+                    if hasattr(thread, "stop"):
+                        thread.stop()
+                        thread.join()
+
+
+@contextmanager
+def global_generators(seed: int) -> Iterator[None]:
+    """Seed the global generators of Python and numpy, and leave them as they were."""
+    kept, kept_by_numpy = python_random.getstate(), np.random.get_state()
+    python_random.seed(seed)
+    np.random.seed(seed)
+    try:
+        yield
+    finally:
+        python_random.setstate(kept)
+        np.random.set_state(kept_by_numpy)
 
 
 @dataclass(frozen=True)

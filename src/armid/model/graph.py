@@ -55,8 +55,6 @@ class Graph:
     nodes: dict[str, Node] = field(default_factory=dict)
 
     def add(self, node: Node) -> None:
-        if node.key in self.nodes:
-            raise ModelError(f"'{node.key.replace('__', '.')}' is there twice: each effect at most once is expected")
         self.nodes[node.key] = node
 
     def of_kind(self, *kinds: str) -> list[Node]:

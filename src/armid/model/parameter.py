@@ -83,11 +83,6 @@ class Scales:
     length_unit: str = "rad"
 
     @property
-    def speed_unit(self) -> str:
-        """Unit of speed."""
-        return f"{self.length_unit}/s"
-
-    @property
     def inertia_unit(self) -> str:
         """Unit of effort over acceleration."""
         return "kg" if self.length_unit == "m" else "kg m2"

@@ -136,8 +136,6 @@ def record_weights(fitness: Fitness, durations: ArrayLike, n_samples: ArrayLike)
 
 def joined(fitness: Fitness, table: Array, weight: Array) -> Array:
     """Join the values of records, (n_records, n_candidates): one for each candidate, +inf if a record failed."""
-    if table.ndim != 2 or weight.shape != table.shape[:1] or len(table) == 0:
-        raise ArmidError(f"{table.shape} values and {weight.shape} weights of records do not match")
     failed = ~np.asarray(np.isfinite(table).all(axis=0))
     known = np.where(failed, 0.0, table) if failed.any() else table
     # no matrix product: its rounding of one candidate may depend on how many others there are

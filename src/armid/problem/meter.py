@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 from pymoo.core.problem import Problem
 from pymoo.core.termination import Termination
 
-from armid.errors import ArmidError
+from armid.errors import ArmidError, quoted
 from armid.model import Array
 
 FIRST_CHUNK = 1024
@@ -57,7 +57,8 @@ class Meter:
         if isinstance(budget, bool) or not isinstance(budget, int | np.integer) or budget < 1:
             raise ArmidError(f"the budget is {budget!r}, expected a whole number of simulations above 0")
         if budget > LARGEST_BUDGET:
-            raise ArmidError(f"the budget is {budget:.6g}, expected at most {LARGEST_BUDGET:,} simulations")
+            # a whole number may have more digits than any float
+            raise ArmidError(f"the budget is {quoted(budget)}, expected at most {LARGEST_BUDGET:,} simulations")
         if target is not None and not isinstance(target, int | float | np.number):
             raise ArmidError(f"the target is {target!r}, expected a fitness")
         if target is not None and np.isnan(target):

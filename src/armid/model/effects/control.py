@@ -207,6 +207,7 @@ command_filter = replace(
 )  # fmt: skip
 voltage_filter = replace(
     late_voltage, form="voltage_filter", exact=late_voltage, delays=(), adds={"winding": filtered_drive},
+    binds={"drive_effort": "voltage"},
     states=tuple(replace(s, unit=s.unit.replace("effort", "V")) for s in command_filter.states),
     note="the voltage at the motor is late by a dead time (second-order filter)", source=PADE,
 )  # fmt: skip

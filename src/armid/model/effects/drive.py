@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from armid.model.effect import SIGN_WIDTH, SIZE_WIDTH, Delay, Effect, Guard, State, drive_now, zero
+from armid.model.effect import SIGN_WIDTH, SIZE_WIDTH, Effect, Guard, State, start_speed, zero
+from armid.model.effects.sensor import delay_error, lag_error, lagging_rate, output_delay
 from armid.model.parameter import Parameter
 
 
@@ -41,23 +42,10 @@ drive_asymmetry = Effect(
 )  # fmt: skip
 
 
-def drive_lag_effort(time_constant, lagging, drive_effort):
-    """Effort on top of the drive's, z - E, z drives.
-
-    Below 1 ms the filter stays at 1 ms and takes a share tau / 1 ms of the drive: the same delay, no stiff equation,
-    and a derivative by tau at the null. z has settled before the start.
-    """
-    return time_constant / np.maximum(time_constant, 1e-3) * (lagging - drive_effort)
-
-
-def drive_lag_rate(time_constant, lagging, drive_effort):
-    """Rate of the effort that drives, (E - lagging) / time_constant."""
-    return (drive_effort - lagging) / np.maximum(time_constant, 1e-3)
-
-
+# What lags or is late is the effort of the drive, as in a sensor the speed: both have settled before the start.
 actuator_lag = Effect(
-    name="drive_lag", form="actuator", adds={"drive": drive_lag_effort},
-    states=(State("lagging", "effort", drive_lag_rate, drive_now),),
+    name="drive_lag", form="actuator", adds={"drive": lag_error}, binds={"omega": "drive_effort"},
+    states=(State("lagging", "effort", lagging_rate, start_speed),),
     parameters=(Parameter("time_constant", "s", 0.0, 0.5, null=0.0, note="of a propeller, a valve, a cylinder"),),
     note="the actuator follows late, first order, up to half a second",
     source="Mahony, Kumar, Corke 2012, doi:10.1109/MRA.2012.2206474 (rotors)",
@@ -65,8 +53,8 @@ actuator_lag = Effect(
 # Behind a motor that induces a voltage of its own a lagging voltage is not a lagging torque: taken for one it bends the
 # inertia. Where the plant computes its own command, the port of that command takes the lag.
 voltage_lag = replace(
-    actuator_lag, form="voltage", unless="command", adds={"winding": drive_lag_effort},
-    states=(State("lagging", "V", drive_lag_rate, drive_now),), binds={"drive_effort": "voltage"},
+    actuator_lag, form="voltage", unless="command", adds={"winding": lag_error},
+    states=(State("lagging", "V", lagging_rate, start_speed),), binds={"omega": "voltage"},
     parameters=(Parameter("time_constant", "s", 0.0, 0.05, null=0.0, note="of the amplifier"),),
     note="the voltage at the motor follows late, first order",
 )  # fmt: skip
@@ -78,19 +66,15 @@ drive_lag = replace(
 )  # fmt: skip
 
 
-def late_effort(late, drive_effort):
-    """Effort on top of the drive's, E(t - T) - E(t): the drive of a dead time T ago acts."""
-    return late - drive_effort
-
-
 torque_delay = Effect(
-    name="drive_delay", form="effort", adds={"drive": late_effort}, delays=(Delay("late", drive_now, "delay"),),
+    name="drive_delay", form="effort", adds={"drive": delay_error}, binds={"omega": "drive_effort"},
+    delays=output_delay.delays,
     parameters=(Parameter("delay", "s", 0.0, 0.1, null=0.0, note="dead time of the drive"),),
     note="the force or torque of the drive is late by a dead time",
     source="Astrom and Murray, Feedback Systems, chapter 9",
 )  # fmt: skip
 voltage_delay = replace(
-    torque_delay, form="voltage", unless="command", adds={"winding": late_effort}, binds={"drive_effort": "voltage"},
+    torque_delay, form="voltage", unless="command", adds={"winding": delay_error}, binds={"omega": "voltage"},
     note="the voltage at the motor is late by a dead time",
 )  # fmt: skip
 drive_delay = replace(torque_delay, forms=(voltage_delay,))

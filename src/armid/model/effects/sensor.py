@@ -44,7 +44,7 @@ def effects_at(output: Output, plant: Plant) -> list[Effect]:
 
 
 def lag_error(time_constant, lagging, omega):
-    """Speed that an instrument reads less the true one [speed].
+    """Speed that an instrument reads less the true one [speed]; of a drive, the effort that acts less its own.
 
     Below 1 ms its filter stays at 1 ms and takes a share tau / 1 ms of the signal: the same delay, no stiff equation,
     and a derivative by tau at the null.
@@ -94,7 +94,7 @@ gyro_scale = Effect(
 
 
 def lagging_rate(time_constant, lagging, omega):
-    """Rate of the recorded signal, (omega - lagging) / time_constant."""
+    """Rate of the signal that lags, (omega - lagging) / time_constant."""
     return (omega - lagging) / np.maximum(time_constant, 1e-3)
 
 
@@ -106,7 +106,7 @@ output_lag = Effect(
 
 
 def delay_error(late, omega):
-    """Speed that is recorded less the true one, w(t - T) - w(t): the sensor shows the speed of a dead time T ago."""
+    """Speed that is recorded less the true one, w(t - T) - w(t): that of a dead time T ago; of a drive, its effort."""
     return late - omega
 
 

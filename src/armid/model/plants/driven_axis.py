@@ -4,11 +4,9 @@ Linear (a mass in kg, speed in m/s) or rotary (an inertia in kg m2, speed in rad
 sample from the measured position and speed. Its scales stand for 1 until a campaign sets them from its train records.
 """
 
-from dataclasses import replace
-
 import numpy as np
 
-from armid.model.effect import State
+from armid.model.effect import Equation, State
 from armid.model.parameter import Parameter, Scales
 from armid.model.plant import Constant, Input, Plant
 
@@ -48,46 +46,38 @@ def first_speed(start_speed):
     return start_speed
 
 
-linear_axis = Plant(
-    name="driven_axis",
-    note="axis with a measured drive, linear or rotary: J dv/dt = gain u - m g l sin q",
-    parameters=(Parameter("mass", "inertia", 0.001, 5.0, note="moving mass"),),
-    states=(
-        State("q", "m", position_rate, first_position, "position_m"),
-        State("v", "m/s", linear_speed_rate, first_speed, "speed_m_s"),
-    ),
-    quantities={"drive_effort": drive_effort, "gravity_effort": gravity_effort, "recorded_speed": recorded_speed},
-    constants=(
-        Constant("gain", 1.0, "effort per unit of the drive column", "1 when the drive is recorded as force or torque"),
-        Constant("gravity_moment", 0.0, "N m", "m g l of a pendulum, 0 for a level axis"),
-        Constant("start_position", 0.0, "m", "set from the record"),
-        Constant("start_speed", 0.0, "m/s", "set from the record"),
-    ),
-    inputs=(Input("u", "V, N or N m", ("drive_V", "drive_N", "drive_N_m", "current_A")),),
-    ports={"torque": "N", "drive": "N", "output": "m/s"},
-    aliases={"omega": "v", "theta": "q", "speed": "v", "position": "q", "load_effort": "gravity_effort"},
-    output="recorded_speed",
-    output_unit="m/s",
-    scales=Scales(effort=1.0, speed=1.0, effort_unit="N", length_unit="m"),
-    from_rest=False,
-    scales_from_records=True,
-)
+def axis(
+    inertia: Parameter, speed_rate: Equation, unit: str, effort_unit: str, variants: tuple[Plant, ...] = ()
+) -> Plant:
+    """Return the axis for one unit of its position, rad or m."""
+    return Plant(
+        name="driven_axis",
+        note="axis with a measured drive, linear or rotary: J dv/dt = gain u - m g l sin q",
+        parameters=(inertia,),
+        states=(
+            State("q", unit, position_rate, first_position, f"{'angle' if unit == 'rad' else 'position'}_{unit}"),
+            State("v", f"{unit}/s", speed_rate, first_speed, f"speed_{unit}_s"),
+        ),
+        quantities={"drive_effort": drive_effort, "gravity_effort": gravity_effort, "recorded_speed": recorded_speed},
+        constants=(
+            Constant("gain", 1.0, "effort per unit of the drive column",
+                     "1 when the drive is recorded as force or torque"),
+            Constant("gravity_moment", 0.0, "N m", "m g l of a pendulum, 0 for a level axis"),
+            Constant("start_position", 0.0, unit, "set from the record"),
+            Constant("start_speed", 0.0, f"{unit}/s", "set from the record"),
+        ),
+        inputs=(Input("u", "V, N or N m", ("drive_V", "drive_N", "drive_N_m", "current_A")),),
+        ports={"torque": effort_unit, "drive": effort_unit, "output": f"{unit}/s"},
+        aliases={"omega": "v", "theta": "q", "speed": "v", "position": "q", "load_effort": "gravity_effort"},
+        output="recorded_speed",
+        output_unit=f"{unit}/s",
+        scales=Scales(1.0, 1.0, effort_unit, unit),
+        from_rest=False,
+        scales_from_records=True,
+        variants=variants,
+    )  # fmt: skip
 
-rotary_axis = replace(
-    linear_axis,
-    parameters=(Parameter("inertia", "inertia", 0.001, 5.0, note="moving inertia"),),
-    states=(
-        State("q", "rad", position_rate, first_position, "angle_rad"),
-        State("v", "rad/s", rotary_speed_rate, first_speed, "speed_rad_s"),
-    ),
-    constants=(
-        *linear_axis.constants[:2],
-        Constant("start_position", 0.0, "rad", "set from the record"),
-        Constant("start_speed", 0.0, "rad/s", "set from the record"),
-    ),
-    ports={"torque": "N m", "drive": "N m", "output": "rad/s"},
-    output_unit="rad/s",
-    scales=Scales(effort=1.0, speed=1.0),
-)
 
-driven_axis = replace(linear_axis, variants=(rotary_axis,))
+rotary_axis = axis(Parameter("inertia", "inertia", 0.001, 5.0, note="moving inertia"), rotary_speed_rate, "rad", "N m")
+driven_axis = axis(Parameter("mass", "inertia", 0.001, 5.0, note="moving mass"), linear_speed_rate, "m", "N",
+                   variants=(rotary_axis,))  # fmt: skip
