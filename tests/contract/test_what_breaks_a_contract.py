@@ -92,12 +92,11 @@ def test_an_effect_misses_a_point_of_its_declaration(point: str, given: Effect) 
     assert point != "binds" or "altitude" in failed(check_effect(given, AXIS))["binds"]
 
 
-def test_silence_is_said_and_only_the_catalogue_fails_for_it() -> None:
+def test_silence_is_said_and_is_no_fault() -> None:
     silent = effect(lambda omega, level: -level * omega, states=(State("x", "1", drag, lambda: 0.0),))
     said = next(f for f in check_effect(silent, {}) if f.name == "documented")
     assert said.passed
     assert said.sentence == "no docstring: own__torque, initial__own__x"
-    assert "documented" in failed(check_effect(silent, {}, strict=True))
 
 
 @pytest.mark.slow

@@ -172,7 +172,8 @@ def test_sine_and_cosine_agree_with_numpy(case: Case, results: dict[str, Array])
 
 
 def test_every_function_of_lanes_has_a_case() -> None:
-    spelt = {operator.pow: "**", operator.and_: "&", operator.or_: "|", operator.invert: "~"}
+    spelt = {operator.pow: "**", operator.and_: "&", operator.or_: "|", operator.invert: "~", operator.neg: "-x",
+             operator.pos: "+x"}  # fmt: skip
     for function in lane_numpy.LANE_FUNCTIONS:
         name = getattr(function, "__name__", str(function))
         texts = [f"np.{name}(", f"math.{name}("]

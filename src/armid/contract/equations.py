@@ -72,16 +72,13 @@ def plant_points(model: Model) -> Iterator[ContractPoint]:
         yield replace(agrees(model, model, x, m), name=f"compiled (manoeuvre {i + 1})")
 
 
-def check_effect(effect: Effect, plants: Mapping[str, Plant] = PLANTS, strict: bool = False) -> Iterator[ContractPoint]:
-    """Try an effect, in each of its forms, on every plant that offers its ports; yield each point when it is done.
-
-    strict: a function without a docstring fails; otherwise it is only reported.
-    """
-    yield from (point for _, point in check_effects([effect], plants, strict))
+def check_effect(effect: Effect, plants: Mapping[str, Plant] = PLANTS) -> Iterator[ContractPoint]:
+    """Try an effect, in each of its forms, on every plant that offers its ports; yield each point when it is done."""
+    yield from (point for _, point in check_effects([effect], plants))
 
 
 def check_effects(
-    effects: Sequence[Effect], plants: Mapping[str, Plant] = PLANTS, strict: bool = False
+    effects: Sequence[Effect], plants: Mapping[str, Plant] = PLANTS
 ) -> Iterator[tuple[str, ContractPoint]]:
     """Try several effects as `check_effect` does each, with as little to compile as possible; yield name and point.
 
@@ -94,7 +91,7 @@ def check_effects(
         fits: dict[str, list[Model]] = {}
         for name, form in forms.items():
             fits[name], refusals = composed(form, plants)
-            yield from ((name, of_form(p, form)) for p in declared(form, fits[name], refusals, name in taken, strict))
+            yield from ((name, of_form(p, form)) for p in declared(form, fits[name], refusals, name in taken))
         for plant in siblings(plants):
             models = {name: model for name, several in fits.items() for model in several if model.plant is plant}
             joint = joint_model(plant, [forms[name] for name in models])
@@ -120,24 +117,22 @@ def composed(form: Effect, plants: Mapping[str, Plant]) -> tuple[list[Model], li
     return models, refusals
 
 
-def declared(
-    form: Effect, models: Sequence[Model], refusals: list[str], is_taken: bool, strict: bool
-) -> list[ContractPoint]:
+def declared(form: Effect, models: Sequence[Model], refusals: list[str], is_taken: bool) -> list[ContractPoint]:
     """Tell which plants take a form of an effect, else why none does; and what its declaration says.
 
-    is_taken: whether a plant takes any form of it.
+    A function without a docstring is named, and no fault. is_taken: whether a plant takes any form of it.
     """
     fits = f"fits {', '.join(m.plant.name for m in models)}" if models else (
         f"fits no plant ({'; '.join(refusals)}); --plugin FILE.py:attribute has it tried on your own")  # fmt: skip
     nulls = [p.name for p in form.parameters if p.null is not None]
     vanishes = f"vanishes where {', '.join(nulls)} is null" if nulls else "no parameter has a null value"
     silent = [name for name, f in functions_of(form) if not (f.__doc__ or "").strip()]
-    documented = finding("documented", silent, "no docstring: {}", "every function has a docstring")
+    documented = f"no docstring: {', '.join(silent)}" if silent else "every function has a docstring"
     return [
         ContractPoint("binds", is_taken, fits),
         *check_parameters(form.parameters),
         ContractPoint("null values", bool(nulls), vanishes),
-        replace(documented, passed=not (silent and strict)),
+        ContractPoint("documented", True, documented),
     ]
 
 

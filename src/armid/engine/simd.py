@@ -16,7 +16,7 @@ from numba.core.compiler import CompilerBase, DefaultPassBuilder, _LowerResult
 from numba.core.compiler_machinery import register_pass
 from numba.core.errors import TypingError
 from numba.core.typed_passes import NativeLowering
-from numba.extending import intrinsic, lower_builtin, models, overload, register_model, type_callable
+from numba.extending import intrinsic, lower_builtin, models, register_model, type_callable
 
 
 class LinkedLibrary(JITCodeLibrary):  # type: ignore[misc]
@@ -291,16 +291,6 @@ for _name, _symbol in {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==",
 @intrinsic
 def negate(typing_context, a):
     return elementwise(a, lambda builder, x: builder.fneg(x, flags=FLAGS), a)
-
-
-@overload(operator.neg, jit_options=LINKED)
-def lanes_neg(a):
-    return (lambda a: negate(a)) if isinstance(a, Lanes) else None
-
-
-@overload(operator.pos, jit_options=LINKED)
-def lanes_pos(a):
-    return (lambda a: a) if isinstance(a, Lanes) else None
 
 
 def vector_call(builder: Any, name: str, *vectors: Any) -> Any:

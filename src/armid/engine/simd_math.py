@@ -29,6 +29,7 @@ from armid.engine.simd import (
     mixes_lanes,
     n_lanes,
     nearest,
+    negate,
     select,
     square_root,
     two_to_the,
@@ -291,7 +292,8 @@ define_unary((np.tanh, math.tanh), lanes_tanh)
 define_unary((np.sign,), lanes_sign)
 define_unary((np.square,), compiled(lambda x: x * x))
 define_unary((np.reciprocal,), compiled(lambda x: 1.0 / x))
-define_unary((np.negative,), compiled(lambda x: -x))
+define_unary((np.negative, operator.neg), negate)
+define_unary((operator.pos,), compiled(lambda x: x))
 define_unary((np.logical_not, operator.invert), compiled(lambda x: x == 0.0))
 define_binary((operator.pow, np.power, math.pow), lanes_power)
 define_binary((builtins.min,), smaller)

@@ -179,7 +179,8 @@ class Trial:
     def shift(self, record: Record, Z: Array) -> int:
         """Return by how many samples the first piece comes too late, 0 where no shift makes it more alike."""
         piece = record.pieces[0]
-        x, n = record.signals[0].seen(piece), record.signals[0].n_seen(piece)
+        x = record.signals[0].seen(piece)
+        n = len(x)
         (signals,) = self.signals(replace(record.each[0], pieces=(piece,)), Z)
         product = np.fft.irfft(np.fft.rfft(x, 2 * n) * np.conj(np.fft.rfft(signals, 2 * n)), axis=-1)
         shifts = np.arange(-int(MOST_SHIFT * n), int(MOST_SHIFT * n) + 1)

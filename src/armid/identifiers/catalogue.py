@@ -196,15 +196,7 @@ def identifier_of(name: str, known: Mapping[str, Identifier]) -> Identifier:
     raise ArmidError(f"identifier '{name}' is not known: {nearest(name, known)}")
 
 
-_IDENTIFIERS = (
-    PSO,
-    *EVOLUTIONARY,
-    *NLOPT,
-    LEAST_SQUARES,
-    *FOREIGN,
-)
-
-IDENTIFIERS = Catalogue[Identifier]({identifier.name: identifier for identifier in _IDENTIFIERS})
+IDENTIFIERS = Catalogue[Identifier]({i.name: i for i in (PSO, *EVOLUTIONARY, *NLOPT, LEAST_SQUARES, *FOREIGN)})
 """Name -> identifier, in the order in which `armid list` shows them."""
 
 

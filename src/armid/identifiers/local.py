@@ -45,10 +45,31 @@ class TrustRegion(SearchOptions):
         """Let scipy minimise from a start in the unit cube, (n,)."""
         from scipy.optimize import least_squares
 
-        residual = Residual(task, self.step, self.differences)
+        here: Array | None = None
+
+        def residual(u: Array) -> Array:
+            # not finite where the simulation failed: scipy takes back a step that leads there
+            nonlocal here
+            told = task.ask(task.cube.candidates(u), residuals=True)
+            assert told.residuals is not None
+            failed = not np.isfinite(told.F[0])
+            if failed and here is None:
+                raise NoFitnessError
+            here = np.asarray(np.full_like(told.residuals[0], np.nan) if failed else told.residuals[0])
+            return here
+
+        def derivative(u: Array) -> Array:
+            # scipy asks at the point whose residual it asked for last, which is accepted
+            points, offsets = stencil(u, self.step, self.differences)
+            told = task.ask(task.cube.candidates(points), residuals=True)
+            assert told.residuals is not None
+            assert here is not None
+            there = np.where(np.isfinite(told.F)[:, np.newaxis], told.residuals, np.nan)
+            return np.asarray(slopes(points, offsets, here, there).T)
+
         # no limit on the gradient: its size is not a share of the range
         least_squares(
-            residual.at, start, residual.derivative, (0.0, 1.0), "trf", ftol=self.tolerance, xtol=self.tolerance,
+            residual, start, derivative, (0.0, 1.0), "trf", ftol=self.tolerance, xtol=self.tolerance,
             gtol=None, max_nfev=MOST_CALLS,
         )  # fmt: skip
 
@@ -57,47 +78,11 @@ LEAST_SQUARES = declared("least_squares", "trust region on the residual vector (
                          uses_gradient=True, needs_residuals=True)  # fmt: skip
 
 
-class Residual:
-    """Give scipy residuals and their derivatives; the latter at the point that it asked for last, which is accepted."""
+def stencil(u: Array, step: float, kind: str) -> tuple[Array, Array]:
+    """Return the points near u at which each parameter is perturbed alone, one side first, and how far each is from u.
 
-    def __init__(self, task: SearchTask, step: float, differences: str) -> None:
-        self.cube, self.ask, self.step, self.differences = task.cube, task.ask, step, differences
-        self.here: Array | None = None
-
-    def at(self, u: Array) -> Array:
-        """Return the residual at a point of the unit cube, (n_total,); not finite where the simulation failed.
-
-        scipy takes back a step that leads to such a point. Raises NoFitnessError when the first point is one.
-        """
-        told = self.ask(self.cube.candidates(u), residuals=True)
-        assert told.residuals is not None
-        failed = not np.isfinite(told.F[0])
-        if failed and self.here is None:
-            raise NoFitnessError
-        self.here = np.asarray(np.full_like(told.residuals[0], np.nan) if failed else told.residuals[0])
-        return self.here
-
-    def derivative(self, u: Array) -> Array:
-        assert self.here is not None
-        beside = stencil(u, self.step, self.differences)
-        told = self.ask(self.cube.candidates(beside.points), residuals=True)
-        assert told.residuals is not None
-        there = np.where(np.isfinite(told.F)[:, np.newaxis], told.residuals, np.nan)
-        return np.asarray(slopes(beside, self.here, there).T)
-
-
-@dataclass(frozen=True)
-class Stencil:
-    """The points near u at which each parameter is perturbed alone, one side first, and how far each is from u."""
-
-    points: Array
-    offsets: Array
-
-
-def stencil(u: Array, step: float, kind: str) -> Stencil:
-    """Return the points at u + step and, when central, u - step; a point that would leave the cube turns inwards.
-
-    A central one at a bound keeps its inner point and adds one twice as far inside.
+    They are at u + step and, when central, u - step; a point that would leave the cube turns inwards. A central one at
+    a bound keeps its inner point and adds one twice as far inside.
     """
     ahead = np.where(u + step <= 1.0, step, -step)
     behind = np.where((u - ahead >= 0.0) & (u - ahead <= 1.0), -ahead, 2.0 * ahead)
@@ -106,21 +91,21 @@ def stencil(u: Array, step: float, kind: str) -> Stencil:
     row = np.arange(len(offsets))
     column = row % len(u)
     points[row, column] += offsets
-    return Stencil(points, points[row, column] - u[column])
+    return points, points[row, column] - u[column]
 
 
-def slopes(stencil: Stencil, here: Array, there: Array) -> Array:
+def slopes(points: Array, offsets: Array, here: Array, there: Array) -> Array:
     """Return derivatives with respect to the parameters, (n, m); where a side failed the other serves, else 0.
 
     With offsets a, b: f' = (d_a b/a - d_b a/b)/(b - a), second order for any a, b; (f(u + a) - f(u))/a for one of them.
     """
     with np.errstate(invalid="ignore"):
-        quotients = (there - here) / stencil.offsets[:, np.newaxis]
+        quotients = (there - here) / offsets[:, np.newaxis]
     good = np.asarray(np.isfinite(quotients).all(axis=1))
-    n = stencil.points.shape[1]
+    n = points.shape[1]
     if len(quotients) == n:
         return np.where(good[:, np.newaxis], quotients, 0.0)
-    a, b = stencil.offsets[:n, np.newaxis], stencil.offsets[n:, np.newaxis]
+    a, b = offsets[:n, np.newaxis], offsets[n:, np.newaxis]
     first, second = quotients[:n], quotients[n:]
     with np.errstate(invalid="ignore"):
         both = (first * b - second * a) / (b - a)
@@ -142,8 +127,8 @@ class ByValues(SearchOptions):
     initial_step: float = share(0.05, "first step", most=0.5, tune=(0.005, 0.5))
     tolerance: float = option(1e-10, "it ends when a step changes no parameter by more", RANGE)
 
-    def beside(self, here: Array) -> Stencil | None:
-        """Return the points that derivatives are made of."""
+    def beside(self, here: Array) -> tuple[Array, Array] | None:
+        """Return the points that derivatives are made of, see `stencil`."""
         return None
 
     def search(self, task: SearchTask) -> None:
@@ -159,10 +144,10 @@ class ByValues(SearchOptions):
             # the point is a buffer that NLopt uses again
             here = u.copy()
             beside = self.beside(here) if gradient.size else None
-            F = task.ask(cube.candidates(here if beside is None else np.vstack([here, beside.points]))).F
+            F = task.ask(cube.candidates(here if beside is None else np.vstack([here, beside[0]]))).F
             scaled = height.of(float(F[0]))
             if beside is not None:
-                gradient[:] = slopes(beside, F[:1], F[1:, np.newaxis])[:, 0] / height.scale
+                gradient[:] = slopes(*beside, F[:1], F[1:, np.newaxis])[:, 0] / height.scale
             return scaled
 
         # NLopt's generator belongs to the thread and would be seeded by the clock
@@ -189,7 +174,7 @@ class ByGradient(ByValues):
     differences: str = option(CENTRAL, "forward or central", "", known=DIFFERENCES)
     step: float = share(1e-6, "how far a perturbed candidate is")
 
-    def beside(self, here: Array) -> Stencil:
+    def beside(self, here: Array) -> tuple[Array, Array]:
         """Return the perturbed points."""
         return stencil(here, self.step, self.differences)
 

@@ -284,7 +284,7 @@ def soundness(record: Record, reach: int) -> Array:
     """Return 0 for the samples of a record behind some that are no data, as far as the filter of the noise reaches."""
     sound = []
     for piece in record.pieces:
-        n_seen = record.signals[0].n_seen(piece)
+        n_seen = len(record.signals[0].seen(piece))
         apart = np.diff(np.arange(piece.manoeuvre.n_samples)[record.signals[0].samples(piece)])
         # of a sensor that holds its value, or comes rarely, the usual distance is not a gap
         near = np.append(True, apart <= 1.5 * np.median(apart)) if apart.size else np.ones(n_seen, np.bool_)

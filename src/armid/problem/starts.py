@@ -116,10 +116,6 @@ class Start:
         given = self.piece.manoeuvre.constants
         return np.array([given[name] for name in self.names])
 
-    @property
-    def size(self) -> float:
-        return self.ready.model.plant.scales.speed
-
     @cached_property
     def places(self) -> tuple[int, ...]:
         return tuple(r.place for r in self.ready.each)
@@ -157,11 +153,11 @@ class Start:
 
     def linear(self, constants: Array, population: Array) -> tuple[Array, Array]:
         """Return signals and d signal / d constant about one start, all in one population, by central differences."""
-        n, moves = len(constants), MOVE * self.size * np.eye(len(constants))
-        starts = np.concatenate([constants[np.newaxis], constants + moves, constants - moves])
+        n, step = len(constants), MOVE * self.ready.model.plant.scales.speed
+        starts = constants + step * np.concatenate([np.zeros((1, n)), np.eye(n), -np.eye(n)])
         signals = self.signals(np.repeat(starts, len(population), axis=0), np.tile(population, (len(starts), 1)))
         by_start = signals.reshape(len(signals), len(starts), len(population), -1).swapaxes(0, 1)
-        return by_start[0], (by_start[1 : 1 + n] - by_start[1 + n :]) / (2.0 * MOVE * self.size)
+        return by_start[0], (by_start[1 : 1 + n] - by_start[1 + n :]) / (2.0 * step)
 
     @cached_property
     def shown(self) -> tuple[Array, Array]:

@@ -228,8 +228,8 @@ def campaign_of(
     for name in sheet.truth:
         if name not in (names := named_parameters(plant, effects)):
             raise unknown_name("parameter", name, names, f"{where}, truth")
-    held = {p.name: parameters[p.name].fixed for p in plant.parameters if p.name in parameters}
-    fixed = {name: value for name, value in held.items() if value is not None}
+    held = ((p.name, parameters.get(p.name, Override()).fixed) for p in plant.parameters)
+    fixed = {name: value for name, value in held if value is not None}
     tolerances = tolerances_of(sheet.tolerances, plant, where, fixed)
     values = {c.name: c.value for c in plant.constants} | dict(sheet.constants) | fixed
     # of what is 0 in every record nothing is known by a share of it

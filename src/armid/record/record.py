@@ -148,10 +148,6 @@ class Signal:
         known = np.ones(self.measured.size) if self.guessed is None else 1.0 - self.guessed
         return piece.of(known)[self.samples(piece)]
 
-    def n_seen(self, piece: Piece) -> int:
-        """Return the number of samples of a piece that fitness and errors see."""
-        return len(self.seen(piece))
-
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Record:
@@ -248,7 +244,7 @@ class Record:
     @property
     def lengths(self) -> tuple[int, ...]:
         """Number of these samples in each piece."""
-        return tuple(self.signals[0].n_seen(p) for p in self.pieces)
+        return tuple(len(self.signals[0].seen(p)) for p in self.pieces)
 
     @property
     def manoeuvre_file(self) -> str:
