@@ -203,6 +203,6 @@ def test_what_is_ranked_by_is_what_it_says():
 
 def test_the_level_to_expect():
     told = [SimpleNamespace(place=place) for place in (0, 1, 0)]
-    level, other = expected_levels(told, [Level(1.0, 1.0), Level(0.1, 1.0), Level(7.0, 0.5, from_residual=True)])
-    assert (other.rms, other.from_residual) == (0.1, False)
-    assert (level.rms, level.effective_fraction, level.from_residual) == (5.0, 0.75, True)
+    level, other = expected_levels(told, [Level(1.0, 1.0), Level(0.1, 1.0), Level(7.0, 0.5)])
+    assert other.rms == 0.1
+    assert (level.rms, level.effective_fraction) == (5.0, 0.75)

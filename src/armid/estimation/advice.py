@@ -8,7 +8,7 @@ made (Lindley 1956, doi:10.1214/aoms/1177728069; Box, Hill 1967, doi:10.1080/004
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -262,19 +262,18 @@ class OldAndNew(LeastSquaresProblem):
         return np.concatenate([self.rival.old(Z), self.new(self.rival, Z)], axis=1)
 
 
-def whitened_signals(feasible: Feasible, white: Whitening, rival: Rival, Z: Array) -> Array:
-    records = rival.records
-    manoeuvre = feasible.of(records.model.plant, rival.constants)
-    run = simulate(records.model, manoeuvre, records.whole(Z), fine_schedule(records.replays))
-    places = sorted({r.place for r in records.replays})
-    return np.asarray(white(run.outputs[places][..., feasible.window]))
-
-
 def simulated(
     rivals: Sequence[Rival], feasible: Feasible, white: Whitening, draws: Array
 ) -> tuple[float, Powers]:  # fmt: skip
     """Return gain and powers of one manoeuvre."""
-    new = partial(whitened_signals, feasible, white)
+
+    def new(rival: Rival, Z: Array) -> Array:
+        records = rival.records
+        manoeuvre = feasible.of(records.model.plant, rival.constants)
+        run = simulate(records.model, manoeuvre, records.whole(Z), fine_schedule(records.replays))
+        places = sorted({r.place for r in records.replays})
+        return np.asarray(white(run.outputs[places][..., feasible.window]))
+
     tried = [simulate_refits(rivals, i, new, draws) for i in range(len(rivals))]
     now = probabilities(rivals)
     after = sum(float(p) * left for p, (*_, left) in zip(now, tried, strict=True))

@@ -122,11 +122,8 @@ def expected_levels(replays: Sequence[Replay], levels: Sequence[Level]) -> tuple
     """Return the level to expect of each output: mean square, mean share of independent samples."""
     places = sorted({r.place for r in replays})
     groups = [[level for r, level in zip(replays, levels, strict=True) if r.place == place] for place in places]
-    return tuple(
-        Level(float(np.sqrt(np.mean([level.rms**2 for level in group]))),
-              float(np.mean([level.effective_fraction for level in group])),
-              any(level.from_residual for level in group), any(level.assumed for level in group)) for group in groups
-    )  # fmt: skip
+    return tuple(Level(float(np.sqrt(np.mean([level.rms**2 for level in group]))),
+                       float(np.mean([level.effective_fraction for level in group]))) for group in groups)  # fmt: skip
 
 
 def manoeuvre_grid(model: Model, records: Sequence[Record]) -> tuple[Feasible, ...]:

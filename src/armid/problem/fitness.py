@@ -226,15 +226,11 @@ def unity(noise: float) -> float:
     return 1.0
 
 
-def dissimilarity(
-    measured: ArrayLike, simulated: ArrayLike, interval: float, epsilon: float = 0.03, xi: float = 0.030,
-    slope_threshold: float = 0.2, degree: int = 0,
-) -> Array:  # fmt: skip
+def dissimilarity(measured: ArrayLike, simulated: ArrayLike, interval: float, degree: int = 0) -> Array:
     """Return 1 - S of Eq 10 per candidate, +inf for one that is not finite; degree 2: 1 - S2 of Eq 14, in steps."""
     from armid.problem.similarity import scored
 
-    values: Array = 1.0 - scored(measured, simulated, interval, epsilon, xi, slope_threshold, failed=-np.inf)[degree]
-    return values
+    return np.asarray(1.0 - scored(measured, simulated, interval, failed=-np.inf)[degree])
 
 
 shape_dissimilarity = partial(dissimilarity, degree=2)

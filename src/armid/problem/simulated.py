@@ -128,16 +128,12 @@ def simulated_piece(
         raise ModelError(f"record '{record.file}': the simulation diverges with these parameters")
     if not calibration.reached:
         off = f"the engine is off by up to {calibration.error:.2g} {model.plant.output_unit} even at its finest steps"
-        warnings.warn(
-            f"{record.file}: {off}: these parameters move too fast for them, or near a "
-            "point from which neighbours part",
-            stacklevel=2,
-        )
+        warnings.warn(f"{record.file}: {off}: these parameters move too fast for them, or near a point from which "
+                      "neighbours part", stacklevel=2)  # fmt: skip
     speed = model.plant.aliases.get("omega", "omega")
     columns = {"time_s": piece.manoeuvre.times()}
-    recorded = {
-        si_header(o)[0]: y[0] / si_header(o)[1] for o, y in zip(model.plant.outputs, simulation.outputs, strict=True)
-    }
+    pairs = zip(map(si_header, model.plant.outputs), simulation.outputs, strict=True)
+    recorded = {header: y[0] / factor for (header, factor), y in pairs}
     for name, state in model.states.items():
         if name == speed and model.plant.records_one_speed:
             columns |= recorded

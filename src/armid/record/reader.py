@@ -129,15 +129,14 @@ def started(record: Record, plant: Plant, tracks: Mapping[str, Track], where: st
     for start in range(0, record.measured.size - length + 1, length):
         if plant.records_one_speed:
             state = state_at(tracks, start)
-        elif spent:
-            first = {name: replace(t, values=t.values[start : start + spent]) for name, t in tracks.items()}
-            state = state_shown(plant, manoeuvre.constants, first, manoeuvre.interval, 0)
         elif fitted:
-            state = state_shown(plant, manoeuvre.constants, tracks, manoeuvre.interval, start)
+            cut = slice(start, start + spent) if spent else slice(None)
+            near = {name: replace(t, values=t.values[cut]) for name, t in tracks.items()}
+            state = state_shown(plant, manoeuvre.constants, near, manoeuvre.interval, 0 if spent else start)
         else:
             state = ({}, {})
-        cut = manoeuvre.part(start, length, state[0])
-        pieces.append(Piece(cut, slice(0, length), start, state[1], spent, state[0] if fitted and trained else {}))
+        part, shown = manoeuvre.part(start, length, state[0]), state[0] if fitted and trained else {}
+        pieces.append(Piece(part, slice(0, length), start, state[1], spent, shown))
     # the first piece starts where the record does
     from_there = replace(manoeuvre, constants=pieces[0].manoeuvre.constants)
     return replace(record, manoeuvre=from_there, whole_pieces=tuple(pieces))
