@@ -182,7 +182,8 @@ def test_a_denied_name_leaves_its_weight_to_what_nobody_knows_and_none_to_its_ri
             for p, names, values in atoms), parameters)  # fmt: skip
 
     denied, rival, unknown = ("effect", "denied"), ("effect", "rival"), ("unknown", "torque")
-    found = mixture(("p", "rival.size"), (0.6, {denied}, (1.0, np.nan)), (0.4, {rival}, (2.0, 7.0)))
+    found = mixture(("p", "rival.size", "denied.size"),
+                    (0.6, {denied}, (1.0, np.nan, 9.0)), (0.4, {rival}, (2.0, 7.0, np.nan)))  # fmt: skip
     standing = mixture(("q", "p"), (0.9, {unknown}, (5.0, 3.0)), (0.1, set(), (6.0, 4.0)))
     left = found.without(frozenset({denied}), standing)
     assert left.sets == pytest.approx({frozenset({unknown}): 0.54, frozenset({rival}): 0.4, frozenset(): 0.06})

@@ -130,7 +130,9 @@ class Posterior:
         lost = 1.0 - sum(weight for _, weight in sound)
         sound += [(atom, lost * weight) for atom, weight in zip(other.atoms, other.weights, strict=True)]
         atoms = tuple(replace(a, log_evidence=0.0, log_prior=float(np.log(w))) for a, w in sound if w > 0.0)
-        return replace(own, atoms=atoms, known=np.fmin(own.known, other.known))
+        found = replace(own, atoms=atoms, known=np.fmin(own.known, other.known))
+        held = np.isfinite(found.means).any(axis=0)
+        return found.over(tuple(name for name, is_held in zip(names, held, strict=True) if is_held))
 
     def over(self, names: tuple[str, ...]) -> "Posterior":
         """Return the same mixture with other parameters, NaN for those that it does not know."""

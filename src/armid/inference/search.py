@@ -241,13 +241,15 @@ def add_unknown(exploration: Exploration) -> bool:
 def add_signals(exploration: Exploration, models: Sequence[Hypotheses]) -> bool:
     """Add signals without a form to some models; return whether a model is new."""
     library, scale, before = exploration.library, exploration.scale(), len(exploration.fits)
+    limit = limit_of(exploration, scale)
     for model in models:
         fit = exploration.fits[model]
         about = expansion_of(fit, scale, library)
         ahead = sorted((forecast(about, p) for p in unknown.propose(fit, library)), key=lambda f: -f.posterior)
         for one in ahead[:N_SIGNALS]:
-            for key, make in trial_of(exploration, model, about, one, np.inf):
-                exploration.take(key, make())
+            for key, make in trial_of(exploration, model, about, one, limit):
+                if key not in exploration.refused:
+                    exploration.take_or_refuse(key, make())
     return len(exploration.fits) > before
 
 

@@ -132,11 +132,11 @@ def about_known(records: WhiteRecords, columns: Array, values: Array, weight: fl
 
 def moved(records: WhiteRecords, unknowns: Sequence[Unknown], values: Sequence[float] | Array) -> WhiteRecords:
     """Return records with the values of some unknowns, constants last: candidates side by side differ in them."""
-    pairs = zip(unknowns, values, strict=True)
-    for unknown, value in sorted(pairs, key=lambda pair: pair[0].product is not None):
-        if value != 0.0:
-            records = unknown.moved(records, float(value))
-    return records
+    pairs = [(u, float(value)) for u, value in zip(unknowns, values, strict=True) if value != 0.0]
+    for unknown, value in pairs:
+        records = records if unknown.product else unknown.moved(records, value)
+    shares = shares_of([u.product for u, _ in pairs], [value for _, value in pairs])
+    return replace(records, replays=moved_replays(records.replays, shares)) if shares else records
 
 
 def freed(

@@ -116,17 +116,20 @@ def propose(fit: Fit, library: Library) -> list[Proposal]:
 def refit(
     library: Library, which: tuple[str, str], fit: Fit, about: Expansion, ahead: Forecast, limit: float
 ) -> Fit | None:
-    """Return the model with a signal without a form: fitted with its covariance, taken about its own estimate."""
+    """Return the model with a signal without a form: fitted with its covariance, taken about its own estimate.
+
+    None where it diverges, or where even so more than a limit is left.
+    """
     again, scale = fit, ahead.best(1)[0][1]
     for _ in range(2):
-        signals = signals_without_form(with_cover(again, None), library).columns
+        signals = signals_without_form(without_cover(again), library).columns
         columns = signals.get(which)
         if columns is None:
             return None
         cover = Cover.of(scale * columns)
         problem = with_cover(again, cover)
         tried = unless_diverged(lambda: fitted(problem, fit.others, about.scale.weight))  # noqa: B023
-        if tried is None:
+        if tried is None or tried.chi2 > limit:
             return None
         again = tried
     # The likeliest variable is a guess, and by a wrong one a model with wrong parameters can leave noise alone: its
@@ -135,6 +138,11 @@ def refit(
     if not curves:
         return again
     return with_cover(again, cover.with_elsewhere(scale / np.sqrt(len(curves)) * np.hstack(curves)))
+
+
+def without_cover(fit: Fit) -> Fit:
+    """Return a fit whose records have no covariance but the noise's; itself where they have none."""
+    return fit if fit.records.data.cover is None else with_cover(fit, None)
 
 
 def with_cover(fit: Fit, cover: Cover | None) -> Fit:
