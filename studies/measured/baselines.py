@@ -44,7 +44,7 @@ class Machine:
 
 @dataclass(frozen=True)
 class Part:
-    """Hold a stretch that is simulated freely: its table (angles in rad), sample interval [s], file, role."""
+    """Hold a part of a record, simulated from its start alone: table (angles in rad), interval [s], file, role."""
 
     table: pd.DataFrame
     interval: float

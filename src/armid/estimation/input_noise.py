@@ -21,7 +21,7 @@ from armid.record.sensor import InputNoise, Mask, lengths_of_rest
 
 # Drawn errors, and their seed.
 DRAWN_ERRORS, SEED_OF_ERRORS = 16, 1
-# Second differences that share a size, and steps towards these sizes.
+# So many neighbouring second differences share a size; the sizes are estimated in so many rounds.
 SHARING, ROUNDS = 9, 40
 # Weights of neighbours in first and second differences.
 CHANGE, BEND = (-1.0, 1.0), (1.0, -2.0, 1.0)

@@ -33,8 +33,9 @@ SHARES_TRIED = (SLOPE, 0.05, 0.4)
 N_STARTS_OF_EFFECT = 4
 # First steps of a fit, after which it shows how far it may lead.
 N_FIRST_STEPS = 2
-# Share of a squared response along one parameter from which an effect may be that parameter, and the share that
-# rounding leaves of what is the same. Strength of other effects where it is looked at, as a share of their size.
+# An effect may be one parameter of the model where this parameter explains such a share of its squared response.
+# Rounding leaves such a share of two responses that are equal. Other effects act meanwhile with such a share of their
+# size.
 PARALLEL, SAME_RESPONSE, COMPANY = 0.9, 1e-7, 0.03
 # How often the change of the parameter that does the same is corrected.
 N_SECANTS = 3

@@ -15,7 +15,7 @@ SCALES_OF_UNIT = {"rad/s": "speed", "m/s": "speed", "rad": "speed*s", "m": "spee
 def sensor_effects(plant: Plant) -> dict[str, Effect]:
     """Return name -> bias, scale, delay and lag (`hub_angle_bias`) of each output that has a port of its own.
 
-    Scale, delay and lag need what the sensor sees: the signal is that and the port, and of a lag it is a state.
+    What the sensor sees is its signal without what is added at the port; a lag takes it from its own state.
     """
     effects = [e for o in plant.outputs if o.port not in ("", "output") for e in effects_at(o, plant)]
     return {e.name: e for e in effects}
