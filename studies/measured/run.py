@@ -19,6 +19,8 @@ from pathlib import Path
 from typing import Any
 
 HERE = Path(__file__).resolve().parent
+# Names of one step in the table.
+MOST_NAMED = 3
 DEG = 180.0 / math.pi
 Report = Mapping[str, Any]
 
@@ -100,12 +102,18 @@ def row(case: Case, report: Report, cpu: float, roles: Mapping[str, str]) -> str
     shown = [" ".join(f"{value * case.factor:.3g}" for value in errors_of(report, case, when, roles)) for when in
              ("before", "after")]  # fmt: skip
     named = [
-        " or ".join((s["effect"], *s["alternatives"])) + ("" if s.get("claimed", True) else " (candidate)")
+        any_of((s["effect"], *s["alternatives"])) + ("" if s.get("claimed", True) else " (candidate)")
         for s in report["steps"]
         if s["effect"] in report["effects"]
     ]
     return (f"| {case.name} | {case.judged} | {case.unit} | {' | '.join(shown)} | {case.published} | "
             f"{'; '.join(named) or 'nothing'} | {report['verdict']} | {cpu:.0f} |")  # fmt: skip
+
+
+def any_of(names: Sequence[str]) -> str:
+    """Return the names of which one holds, the first ones where there are many."""
+    left = len(names) - MOST_NAMED
+    return " or ".join([*names[:MOST_NAMED], *([f"{left} other{'s' if left > 1 else ''}"] if left > 0 else [])])
 
 
 def errors_of(report: Report, case: Case, when: str, roles: Mapping[str, str]) -> Iterator[float]:
