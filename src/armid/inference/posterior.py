@@ -131,7 +131,7 @@ class Posterior:
         sound += [(atom, lost * weight) for atom, weight in zip(other.atoms, other.weights, strict=True)]
         atoms = tuple(replace(a, log_evidence=0.0, log_prior=float(np.log(w))) for a, w in sound if w > 0.0)
         found = replace(own, atoms=atoms, known=np.fmin(own.known, other.known))
-        held = np.isfinite(found.means).any(axis=0)
+        held = np.asarray(np.isfinite(found.means).any(axis=0))
         return found.over(tuple(name for name, is_held in zip(names, held, strict=True) if is_held))
 
     def over(self, names: tuple[str, ...]) -> "Posterior":
