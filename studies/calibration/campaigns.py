@@ -110,7 +110,7 @@ def plain(value: Any) -> Any:
 
 
 def kept_answer(path: Path, task: Task, answer: Callable[[], dict[str, Any]]) -> str:
-    """Keep what is said of a campaign, or the error in which it ended, with its time; return a line about it."""
+    """Keep the answer to a campaign, or the error in which it ended, with its time; return a line about it."""
     before = seconds()
     try:
         kept = answer()

@@ -149,17 +149,18 @@ def page(table: pd.DataFrame, seed: int) -> str:
             error = float(np.hypot(row["nested_error"], first["nested_error"]))
             pairs.append((name, first["model"], row["model"], *by, error))
     apart = [abs(laplace - by_samples) for *_, laplace, by_samples, _ in pairs]
-    said = "No campaign has two models to be compared."
+    sentence = "No campaign has two models to be compared."
     if pairs:
         error = np.median([p[-1] for p in pairs])
-        said = (f"Of {len(pairs)} log Bayes factors the two ways differ by {np.median(apart):.2f} in the median, and "
-                f"by {max(apart):.2f} at most; the median error of nested sampling is {error:.2f}.")  # fmt: skip
+        sentence = (f"Of {len(pairs)} log Bayes factors the two ways differ by {np.median(apart):.2f} in the median, "
+                    f"and by {max(apart):.2f} at most; the median error of nested sampling is "
+                    f"{error:.2f}.")  # fmt: skip
     head = "| campaign | model | against | log Bayes factor, Laplace | nested sampling | its error |"
     lines = [f"| {name} | {other} | {best} | {a:.2f} | {b:.2f} | {e:.2f} |" for name, best, other, a, b, e in pairs]
     n = table["campaign"].nunique()
     return "\n".join([
         "# Laplace's evidence against nested sampling", "",
-        f"{n} synthetic campaigns of the arm, seed {seed}; constants count as known exactly. {said}",
+        f"{n} synthetic campaigns of the arm, seed {seed}; constants count as known exactly. {sentence}",
         "", head, "|---|---|---|---|---|---|", *lines, "",
         f"`python studies/calibration/nested.py FOLDER --seed {seed} --campaigns {n} --out results/nested` makes this "
         "page.", "",

@@ -50,21 +50,21 @@ class TrustRegion(SearchOptions):
         def residual(u: Array) -> Array:
             # not finite where the simulation failed: scipy takes back a step that leads there
             nonlocal here
-            told = task.ask(task.cube.candidates(u), residuals=True)
-            assert told.residuals is not None
-            failed = not np.isfinite(told.F[0])
+            answer = task.ask(task.cube.candidates(u), residuals=True)
+            assert answer.residuals is not None
+            failed = not np.isfinite(answer.F[0])
             if failed and here is None:
                 raise NoFitnessError
-            here = np.asarray(np.full_like(told.residuals[0], np.nan) if failed else told.residuals[0])
+            here = np.asarray(np.full_like(answer.residuals[0], np.nan) if failed else answer.residuals[0])
             return here
 
         def derivative(u: Array) -> Array:
             # scipy asks at the point whose residual it asked for last, which is accepted
             points, offsets = stencil(u, self.step, self.differences)
-            told = task.ask(task.cube.candidates(points), residuals=True)
-            assert told.residuals is not None
+            answer = task.ask(task.cube.candidates(points), residuals=True)
+            assert answer.residuals is not None
             assert here is not None
-            there = np.where(np.isfinite(told.F)[:, np.newaxis], told.residuals, np.nan)
+            there = np.where(np.isfinite(answer.F)[:, np.newaxis], answer.residuals, np.nan)
             return np.asarray(slopes(points, offsets, here, there).T)
 
         # no limit on the gradient: its size is not a share of the range
@@ -127,7 +127,7 @@ class ByValues(SearchOptions):
     initial_step: float = share(0.05, "first step", most=0.5, tune=(0.005, 0.5))
     tolerance: float = option(1e-10, "it ends when a step changes no parameter by more", RANGE)
 
-    def beside(self, here: Array) -> tuple[Array, Array] | None:
+    def perturbed(self, here: Array) -> tuple[Array, Array] | None:
         """Return the points that derivatives are made of, see `stencil`."""
         return None
 
@@ -143,11 +143,11 @@ class ByValues(SearchOptions):
         def value(u: Array, gradient: Array) -> float:
             # the point is a buffer that NLopt uses again
             here = u.copy()
-            beside = self.beside(here) if gradient.size else None
-            F = task.ask(cube.candidates(here if beside is None else np.vstack([here, beside[0]]))).F
+            perturbed = self.perturbed(here) if gradient.size else None
+            F = task.ask(cube.candidates(here if perturbed is None else np.vstack([here, perturbed[0]]))).F
             scaled = height.of(float(F[0]))
-            if beside is not None:
-                gradient[:] = slopes(*beside, F[:1], F[1:, np.newaxis])[:, 0] / height.scale
+            if perturbed is not None:
+                gradient[:] = slopes(*perturbed, F[:1], F[1:, np.newaxis])[:, 0] / height.scale
             return scaled
 
         # NLopt's generator belongs to the thread and would be seeded by the clock
@@ -174,7 +174,7 @@ class ByGradient(ByValues):
     differences: str = option(CENTRAL, "forward or central", "", known=DIFFERENCES)
     step: float = share(1e-6, "how far a perturbed candidate is")
 
-    def beside(self, here: Array) -> tuple[Array, Array]:
+    def perturbed(self, here: Array) -> tuple[Array, Array]:
         """Return the perturbed points."""
         return stencil(here, self.step, self.differences)
 

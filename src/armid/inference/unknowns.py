@@ -49,13 +49,13 @@ MOST_ROUGH = 20
 class Unknown:
     """Declare an unknown.
 
-    moved: the records as they are with a value of it. lost: samples that a value leaves out. column: of records, a
-    candidate and a value, how much of the residual a unit of it takes away; None: by differences. product: which
-    constants it is, None for other unknowns.
+    moved: the records as they are with a value of it; constants are moved together, see `moved`. lost: samples that a
+    value leaves out. column: of records, a candidate and a value, how much of the residual a unit of it takes away;
+    None: by differences. product: which constants it is, None for other unknowns.
     """
 
     name: str
-    moved: Callable[[WhiteRecords, float], WhiteRecords]
+    moved: Callable[[WhiteRecords, float], WhiteRecords] = lambda records, _: records
     lost: Callable[[float], float] = lambda _: 0.0
     column: Callable[[WhiteRecords, Array, float], Array] | None = None
     product: Product | None = None
@@ -72,11 +72,7 @@ class Freed:
 
 def constant(product: Product) -> Unknown:
     """Return a constant, or several that act as one, as an unknown whose prior is its tolerance."""
-
-    def moved_by(records: WhiteRecords, value: float) -> WhiteRecords:
-        return replace(records, replays=moved_replays(records.replays, shares_of([product], [value])))
-
-    return Unknown(product.public, moved_by, product=product)
+    return Unknown(product.public, product=product)
 
 
 def shares_of(chosen: Sequence[Product | None], values: Sequence[float] | Array) -> dict[str, float]:
@@ -134,7 +130,7 @@ def moved(records: WhiteRecords, unknowns: Sequence[Unknown], values: Sequence[f
     """Return records with the values of some unknowns, constants last: candidates side by side differ in them."""
     pairs = [(u, float(value)) for u, value in zip(unknowns, values, strict=True) if value != 0.0]
     for unknown, value in pairs:
-        records = records if unknown.product else unknown.moved(records, value)
+        records = unknown.moved(records, value)
     shares = shares_of([u.product for u, _ in pairs], [value for _, value in pairs])
     return replace(records, replays=moved_replays(records.replays, shares)) if shares else records
 

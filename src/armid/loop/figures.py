@@ -21,6 +21,7 @@ AFTER = OKABE_ITO["blue"]
 LOOKS = (("before", OKABE_ITO["vermilion"]), ("after", AFTER))
 # Where nothing was added, before and after are one.
 UNCHANGED = ("declared model", AFTER)
+COLOUR_OF = dict((*LOOKS, UNCHANGED))
 KINDS_OF_TEST = {
     "record": "record",
     "stage": "stage of the motion",
@@ -121,7 +122,7 @@ def draw_residuals(axis: Any, curves: Mapping[str, Any], noise: float | None, si
         band = 2.0 * noise * factor
         axis.axhspan(-band, band, color=GREY, alpha=0.35, lw=0, label="noise, 2 sigma")
     for name, (x, y) in curves.items():
-        axis.plot(x, factor * y, color=dict((*LOOKS, UNCHANGED))[name], lw=0.9, label=name, gid=name)
+        axis.plot(x, factor * y, color=COLOUR_OF[name], lw=0.9, label=name, gid=name)
     axis.set(ylabel=f"residual [{unit}]", xlabel="time [s]")
     axis.margins(x=0.01)
 
