@@ -6,13 +6,13 @@ What a single column tells of its noise when it is read stands in record/sensor.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import ceil
 from typing import TypeVar
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular, toeplitz
+from scipy.linalg import cholesky, cholesky_banded, solve_banded, solve_triangular, toeplitz
 from scipy.special import fdtrc
 
 from armid.engine import FINE, hiding_noise
@@ -55,19 +55,35 @@ class NoiseModel:
     n_slow: float
     n_power: float
     moved: float = 0.0
+    growth: float = 0.0
+    still: float = 0.0
+    alternation: float = 0.0
 
     @property
     def is_white(self) -> bool:
-        return not len(self.terms)
+        return not (len(self.terms) or self.alternation)
 
     @property
     def known(self) -> bool:
         return self.n_samples > 0
 
     @property
+    def in_motion(self) -> str:
+        """What the noise does in motion that no rest tells, in words."""
+        if self.alternation:
+            return "it alternates from sample to sample, as that of differences of counts does"
+        return f"in motion it grows with the reading, by {self.growth:.2%} of it" if self.growth else ""
+
+    @property
     def total(self) -> float:
         """Rms of what a right model leaves."""
         return float(np.hypot(self.rms, self.moved))
+
+    def weights(self, readings: Array) -> Array:
+        """Return `rms` over the noise of each reading, (n_samples,): sigma^2 = still^2 + (growth x reading)^2."""
+        if not self.growth:
+            return np.ones_like(readings)
+        return np.asarray(self.rms / np.hypot(self.still, self.growth * readings))
 
     def white(self, values: Array, lengths: Sequence[int]) -> Array:
         """Return signals so filtered that the noise in them is white with a standard deviation of 1.
@@ -83,10 +99,24 @@ class NoiseModel:
         n, pieces = len(self.terms), []
         for start, end in pairwise(np.cumsum([0, *lengths])):
             piece = values[..., start:end]
+            if self.alternation:
+                pieces.append(without_alternation(piece, self.alternation) / self.innovation)
+                continue
             filtered = lfilter(np.concatenate([[1.0], -self.terms]), [1.0], piece, axis=-1) / self.innovation
             filtered[..., :n] = piece[..., :n] @ self.head.T
             pieces.append(filtered)
         return np.concatenate(pieces, axis=-1)
+
+
+def without_alternation(values: Array, alternation: float) -> Array:
+    """Return values whose noise e_t = w_t - alternation w_(t-1) is white then: by its Cholesky factor.
+
+    values: (..., n_samples).
+    """
+    n = values.shape[-1]
+    covariance = np.array([[1.0 + alternation**2], [-alternation]]) * np.ones(n)
+    factor = cholesky_banded(covariance, lower=True)
+    return np.asarray(solve_banded((1, 0), factor, values.reshape(-1, n).T, check_finite=False).T.reshape(values.shape))
 
 
 def noise_levels(records: Sequence[Record], plant: Plant, others: Sequence[Record] = ()) -> tuple[NoiseModel, ...]:
@@ -140,6 +170,65 @@ def levels_left(
         stays = level.known or (level.rms <= rms and not memory)
         noises.append(level if stays else remembering_level(rms, memory))
     return tuple(noises)
+
+
+def levels_in_motion(
+    levels: Sequence[NoiseModel], replays: Sequence[Replay], left: Sequence[Array]
+) -> tuple[NoiseModel, ...]:  # fmt: skip
+    """Return the noise of each record as a model that may be right shows it.
+
+    A rest tells nothing of noise that grows with the reading, nor of a speed from differences of counts, whose noise
+    alternates. Of the noise that is known, and of these two, what makes the residuals of a sensor most probable counts,
+    each number that it takes costing half a log of the samples (Schwarz 1978, doi:10.1214/aos/1176344136).
+    left: of each record, its unit, not whitened.
+    """
+    records = [r.record for r in replays]
+    grouped = by_sensor(records, list(zip(levels, [r.measured for r in replays], left, strict=True)))
+    shown = {}
+    for sensor, group in grouped.items():
+        known, readings, parts = (list(one) for one in zip(*group, strict=True))
+        options = [(0, known[0]), (2, growing_level(readings, parts)), (2, alternating_level(parts))]
+        n = sum(map(len, parts))
+        probable = [sum(log_density(level, r, x) for r, x in zip(readings, parts, strict=True)) - 0.5 * k * np.log(n)
+                    for k, level in options]  # fmt: skip
+        shown[sensor] = options[int(np.argmax(probable))][1]
+    return tuple(shown[sensor_of(r)] for r in records)
+
+
+def log_density(level: NoiseModel, readings: Array, residual: Array) -> float:
+    """Return the log density of the residual of a record, up to a constant."""
+    weights = level.weights(readings)
+    white = level.white(residual, [len(residual)]) * weights
+    return float(np.sum(np.log(weights / level.innovation)) - 0.5 * white @ white)
+
+
+def growing_level(readings: Sequence[Array], parts: Sequence[Array]) -> NoiseModel:
+    """Return the noise that makes residuals most probable where it grows with the reading."""
+    from scipy.optimize import minimize
+
+    residual, reading = np.concatenate(parts), np.concatenate(readings)
+    sizes = np.sqrt(np.mean(residual**2)) / np.array([1.0, np.sqrt(np.mean(reading**2))])
+
+    def surprise(logs: Array) -> float:
+        variance = np.sum((np.exp(logs) * np.column_stack([np.ones_like(reading), reading])) ** 2, axis=1)
+        return float(np.sum(np.log(variance) + residual**2 / variance))
+
+    still, growth = np.exp(minimize(surprise, np.log(sizes), method="Nelder-Mead").x)
+    rms = float(np.sqrt(np.mean(still**2 + (growth * reading) ** 2)))
+    return replace(white_level(rms, 0), growth=float(growth), still=float(still))
+
+
+def alternating_level(parts: Sequence[Array]) -> NoiseModel:
+    """Return the noise that makes residuals most probable where neighbouring samples differ in sign."""
+    from scipy.optimize import minimize_scalar
+
+    def size(alternation: float) -> float:
+        return float(np.sqrt(np.mean(np.concatenate([without_alternation(x, alternation) for x in parts]) ** 2)))
+
+    alternation = float(minimize_scalar(size, bounds=(0.0, 1.0), method="bounded").x)
+    innovation = size(alternation)
+    level = white_level(innovation * float(np.sqrt(1.0 + alternation**2)), 0)
+    return replace(level, innovation=innovation, alternation=alternation)
 
 
 def memory_and_sizes(parts: Sequence[Array]) -> tuple[float, list[float]]:

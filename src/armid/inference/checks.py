@@ -306,7 +306,7 @@ def size_tests(seen: Residuals) -> Iterator[Finding]:
     for kind in ("size", "record", "stage"):
         parts = {"size": whole, "record": records if len(records) > 1 else {}}.get(kind)
         for where, samples in (seen.stages if parts is None else parts).items():
-            ratio = float(np.sum(square[samples])) / max(float(seen.data.sound[samples].sum()), 1.0) / share
+            ratio = float(np.sum(square[samples])) / max(float(np.count_nonzero(seen.data.sound[samples])), 1.0) / share
             yield Finding(kind, where, ratio, float(fdtrc(counted[samples].sum() * share, known, ratio)))
 
 

@@ -25,6 +25,8 @@ DENIED = 1.02
 OVER_NOISE = 1.1
 # Probability of a false alarm of the tests for whiteness, all together: one in 200 sound campaigns.
 SIGNIFICANCE = 0.005
+# Chance that a constant is off by more than two of its declared standard deviations, as a normal one is.
+OUT_OF_TOLERANCE = 0.05
 # Change of a record over its noise (rms) from which it is faulty: below it undoing a fault gains by smoothing alone.
 MOVES = 0.7
 # Log posterior odds within which models are expanded, and count as rivals for the next record (Madigan, Raftery 1994).

@@ -15,7 +15,7 @@ from armid.estimation.constants import NAMED
 from armid.estimation.information import NORMAL_95
 from armid.estimation.input_noise import estimated, pooled_noise
 from armid.estimation.least_squares import Estimates, descend, held_by_bound, spread_starts, with_fitted_starts
-from armid.estimation.noise_model import NoiseModel, levels_left
+from armid.estimation.noise_model import NoiseModel, levels_in_motion, levels_left
 from armid.inference.candidates import constant_effects
 from armid.inference.carry_over import predicting_best
 from armid.inference.checks import is_significant, train_residuals
@@ -91,8 +91,9 @@ class Inference:
 
     @property
     def named(self) -> list[Hypotheses]:
-        """The models whose parts all have names, the most probable first."""
-        return [m for m, _ in self.exploration.ranked() if not any(h.kind == "unknown" for h in m)]
+        """The models whose parts all have names, the most probable first; an effect at its null is no part of one."""
+        models = [m for m, _ in self.exploration.ranked() if not any(h.kind == "unknown" for h in m)]
+        return [m for m in models if not self.exploration.fits[m].has_idle_effect]
 
     def without(self, denied: Hypotheses, standing: Hypotheses) -> "Inference":
         """Return what is probable where held-out records deny some hypotheses; standing: the model that is left."""
@@ -290,6 +291,10 @@ def infer(library: Library, declared: Fit) -> Inference:
     with a prior. Models are explored in Occam's window; `evidence` says how a model gets its probability.
     """
     inference = inferred(library, declared)
+    shown = with_noise_in_motion(library, inference)
+    if shown is not library:
+        library, declared = shown, declared_again(shown, declared)
+        inference = inferred(library, declared)
     if not pooled_noise(library.data.records):
         return inference
     exact = library
@@ -393,6 +398,25 @@ def with_noise(library: Library, declared: Fit) -> tuple[Library, Fit]:
         return library, declared
     library = library.with_data(library.data.with_levels(levels))
     return library, declared_again(library, declared)
+
+
+def with_noise_in_motion(library: Library, inference: Inference) -> Library:
+    """Return the library with the noise that the model in force shows, itself where nothing asks for it.
+
+    Where something unknown is in the records, noise that no rest tells may be all of it: where the records are more
+    probable with such noise than with an unknown signal, and no test finds more.
+    """
+    fit, best = inference.exploration.fits[inference.in_force], inference.best
+    if inference.posterior.probability("unknown") < MENTIONED or library.data.inputs_count:
+        return library
+    seen = train_residuals(fit)
+    data = library.data.with_levels(levels_in_motion(library.data.levels, seen.replays, seen.raw))
+    problem = replace(fit.records, data=data)
+    shown = Fit(fit.active, problem, fit.z, problem.plain.residuals(fit.z)[0])
+    if is_significant(shown) or shown.log_density <= best.log_density - 0.5 * best.records.data.log_cover:
+        return library
+    library.say("the noise in motion is another than at rest: the records are more probable so")
+    return library.with_data(data)
 
 
 def with_input_noise(library: Library, declared: Fit) -> tuple[Library, Fit]:

@@ -55,7 +55,7 @@ class Library:
     as_read: the data whose inputs count as exact, where in `data` they count as measured with noise, else None.
     reach: by which factor strengths that scale with the machine may exceed their declared range. widened: ranges of
     strengths of the declared model that were too narrow. doubles: effects that do what a free parameter of the declared
-    model does, and its name; they are not tried.
+    model does, or a constant within its tolerance, and its name.
     """
 
     declared: Model
@@ -81,7 +81,12 @@ class Library:
 
     def joinable(self, active: Active) -> list[EffectKey]:
         there = {other.public for other in active}
-        return [k for k in self.candidates if k.public not in there and k not in self.doubles]
+        return [k for k in self.candidates if k.public not in there and k not in self.left_out]
+
+    @property
+    def left_out(self) -> dict[EffectKey, str]:
+        """The effects that a free parameter does already, which are not tried, and its name."""
+        return {key: name for key, name in self.doubles.items() if name not in self.tolerances}
 
     def owner(self, parameter: str) -> EffectKey | None:
         """Return the candidate to which a parameter of a compiled model belongs, None for the declared model's own."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from armid.errors import ArmidError
 from armid.estimation.constants import Product, products
 from armid.estimation.information import information_at, start_changes
-from armid.estimation.least_squares import MOST_ROUNDS, SETTLED_CHI2, descend, held_by_bound, promised_fall
+from armid.estimation.least_squares import AT_BOUND, MOST_ROUNDS, SETTLED_CHI2, descend, held_by_bound, promised_fall
 from armid.inference.candidates import Active, EffectKey, idle
 from armid.inference.library import Activation, Library, calibrated_replays, finest, is_finer, points_within
 from armid.inference.whitening import WhiteRecords
@@ -132,6 +132,15 @@ class Fit:
         held = held_by_bound(self.records.space, self.x)
         return any(is_held and key.owns(name) and self.model.parameters[name].null is not None
                    for name, is_held in zip(self.values, held, strict=True))  # fmt: skip
+
+    @property
+    def has_idle_effect(self) -> bool:
+        """Whether an effect does nothing at the fit: all its strengths are at their nulls."""
+        pairs = zip(self.values.items(), self.records.span, strict=True)
+        away = {name: abs(value - null) > AT_BOUND * span for (name, value), span in pairs
+                if (null := self.model.parameters[name].null) is not None}  # fmt: skip
+        strengths = [[is_away for name, is_away in away.items() if key.owns(name)] for key in self.active]
+        return any(own and not any(own) for own in strengths)
 
     def products(self, tolerances: Mapping[str, float]) -> tuple[Product, ...]:
         """Return the constants within tolerances that the records see at the fit, see `products`."""

@@ -86,9 +86,9 @@ class Block:
 class WhitenedData:
     """Hold records with their noise. Lists and arrays have an entry for each signal, record by record.
 
-    levels: noise of each. sound: 0 where a sample is invalid, else 1, (n_samples,). estimates: where those of fits are
-    kept, None: nowhere. blocks: correlated noise, of pieces that have some. cover: of a signal without a form; None for
-    none.
+    levels: noise of each. sound: 0 where a sample is invalid, else 1, or its weight where noise grows, (n_samples,).
+    estimates: where those of fits are kept, None: nowhere. blocks: correlated noise, of pieces that have some. cover:
+    of a signal without a form; None for none.
     """
 
     records: tuple[Record, ...]
@@ -101,14 +101,19 @@ class WhitenedData:
     @cached_property
     def log_noise(self) -> float:
         """Half of the log determinant of the covariance of the noise."""
-        scale = sum(float(sound.sum()) * np.log(level.innovation)
+        scale = sum(float(np.sum(np.log(level.innovation / sound[sound > 0.0])))
                     for level, sound in zip(self.levels, self.by_record(self.sound), strict=True))  # fmt: skip
         return float(scale + 0.5 * sum(np.sum(np.log1p(b.cover.sizes)) for b in self.sound_blocks))
 
     @cached_property
+    def counts_all(self) -> bool:
+        """Whether all samples count alike."""
+        return bool((self.sound == 1.0).all())
+
+    @cached_property
     def sound_blocks(self) -> tuple[Block, ...]:
         """The blocks in the samples that count."""
-        return self.blocks if self.sound.all() else blocks_of_rows(self.blocks, self.sound.tobytes())
+        return self.blocks if self.counts_all else blocks_of_rows(self.blocks, self.sound.tobytes())
 
     @property
     def log_cover(self) -> float:
@@ -165,7 +170,7 @@ class WhitenedData:
         triples = zip(self.levels, signals, self.lengths, strict=True)
         white = np.concatenate([level.white(s, lengths) for level, s, lengths in triples], axis=-1)
         # Invalid samples have weight 0.
-        white = white if self.sound.all() else white * self.sound
+        white = white if self.counts_all else white * self.sound
         for block in self.sound_blocks:
             white[..., block.at] = block.cover.white(white[..., block.at])
         return white if self.cover is None else self.cover.white(white)
@@ -202,8 +207,8 @@ class WhitenedData:
 def blocks_of_rows(blocks: tuple[Block, ...], weights: bytes) -> tuple[Block, ...]:
     """Return blocks where samples have weights, (n_samples,)."""
     rows = np.frombuffer(weights)
-    return tuple(b if rows[b.at].all() else replace(b, cover=Cover.seen(b.cover.columns * rows[b.at][:, np.newaxis]))
-                 for b in blocks)  # fmt: skip
+    return tuple(b if (rows[b.at] == 1.0).all() else
+                 replace(b, cover=Cover.seen(b.cover.columns * rows[b.at][:, np.newaxis])) for b in blocks)  # fmt: skip
 
 
 def with_answers(
@@ -271,13 +276,15 @@ def whitened(records: Sequence[Record], plant: Plant, trained: WhitenedData | No
     levels = noise_levels(each, plant, more)
     if trained is not None:
         theirs = dict(zip(map(sensor_of, more), trained.levels, strict=True))
-        levels = tuple(level if level.known else theirs.get(sensor_of(r), level)
-                       for r, level in zip(each, levels, strict=True))  # fmt: skip
+        # a rest of these does not tell what a model had to show of the noise in motion
+        levels = tuple(level if level.known and (own is None or own.known) else own or level for level, own in
+                       zip(levels, [theirs.get(sensor_of(r)) for r in each], strict=True))  # fmt: skip
     return with_standstills(WhitenedData(tuple(records), levels, soundness_of(each, levels)))
 
 
 def soundness_of(each: Sequence[Record], levels: Sequence[NoiseModel]) -> Array:
-    return np.concatenate([soundness(r, len(level.terms)) for r, level in zip(each, levels, strict=True)])
+    return np.concatenate([soundness(r, len(level.terms)) * level.weights(r.seen)
+                           for r, level in zip(each, levels, strict=True)])  # fmt: skip
 
 
 def soundness(record: Record, reach: int) -> Array:

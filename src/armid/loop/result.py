@@ -223,8 +223,11 @@ class ClosedLoop(Result):
     @cached_property
     def outputs(self) -> dict[str, dict[str, Any]]:
         """Output -> its unit, the noise of its train records, and how far noise of their inputs moves the model."""
-        noise = [level.rms for level in self.before.train.data.levels]
-        return entries_of_noise(self.after.train.replays, noise, self.after.train.candidate)
+        levels, train = self.before.train.data.levels, self.after.train
+        entries = entries_of_noise(train.replays, [level.rms for level in levels], train.candidate)
+        for replay, level in zip(train.replays, levels, strict=True):
+            entries[train.model.plant.outputs[replay.place].name]["noise_in_motion"] = level.in_motion
+        return entries
 
     @property
     def noise_rms(self) -> float:

@@ -389,6 +389,7 @@ def noise_text(noise: float, output: Mapping[str, Any], error: Mapping[str, Any]
     """
     value, unit = shown(noise, output["unit"])
     text, moved = f"the noise is {value:.3g} {unit}", moved_of(output)
+    text += f" ({output['noise_in_motion']})" if output.get("noise_in_motion") else ""
     if not inputs_act(noise, moved, error["rmse"]):
         return text
     text += f"; that of the inputs moves the model by {shown(moved, output['unit'])[0]:.3g} {unit}"

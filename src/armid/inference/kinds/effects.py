@@ -7,7 +7,7 @@ import numpy as np
 
 from armid.estimation.least_squares import descend
 from armid.inference.candidates import EffectKey
-from armid.inference.decisions import calibration
+from armid.inference.decisions import OUT_OF_TOLERANCE, calibration
 from armid.inference.evidence import SCALES_OF_STRENGTH, Expansion, Forecast
 from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.library import Library, activation_grid
@@ -45,13 +45,16 @@ def hypotheses(library: Library) -> dict[EffectKey, Hypothesis]:
     """Return a hypothesis for each form of each effect; the forms of one effect share its prior.
 
     That a user asks for a few candidates makes none of them more probable: the whole library shares what is expected.
+    What does the same as a constant within its tolerance is as improbable as that this tolerance is wrong.
     """
     n, forms = len(library.known_names), [key.public for key in library.candidates]
-    odds = {name: library.log_odds(name, calibration().log_odds("effect", n, name)) for name in dict.fromkeys(forms)}
-    return {
-        key: Hypothesis("effect", key.public, key.form, odds[key.public] - np.log(forms.count(key.public)), key)
-        for key in library.candidates
-    }
+
+    def odds(key: EffectKey) -> float:
+        usual = calibration().log_odds("effect", n, key.public)
+        usual += float(np.log(OUT_OF_TOLERANCE)) if library.doubles.get(key) in library.tolerances else 0.0
+        return library.log_odds(key.public, usual) - float(np.log(forms.count(key.public)))
+
+    return {key: Hypothesis("effect", key.public, key.form, odds(key), key) for key in library.candidates}
 
 
 def propose(fit: Fit, known: dict[EffectKey, Hypothesis], library: Library) -> list[Proposal]:
@@ -105,24 +108,30 @@ def proposal(fit: Fit, hypothesis: Hypothesis, key: EffectKey, library: Library)
 
 
 def doubles(fit: Fit, library: Library) -> dict[EffectKey, str]:
-    """Return the effects that do what a free parameter of the declared model does, and nothing else, with its name.
+    """Return the effects that do what the declared model does by itself, and nothing else, with what does it.
 
-    Viscous friction is the damping of a machine that has one: records cannot tell two shares of one quantity, and its
-    interval would reach from none of it to all. Effect and parameter are moved side by side, in the company of other
-    effects: a wrong gain of the drive looks like another mass only until something else acts.
+    That is a free parameter, or a constant that is known within a tolerance. Viscous friction is the damping of a
+    machine that has one: records cannot tell two shares of one quantity, and its interval would reach from none of it
+    to all. Both are moved side by side, in the company of other effects: a wrong gain of the drive looks like another
+    mass only until something else acts.
     """
-    keys = library.joinable(())
-    names = library.each(lambda key: double(fit, key, library), keys)
-    return {key: name for key, name in zip(keys, names, strict=True) if name}
+    keys, products = library.joinable(()), fit.products(library.tolerances)
+    names = [*fit.values, *(p.names[0] for p in products)]
+    slopes = np.column_stack([fit.jacobian / fit.records.span, *(p.slope for p in products)])
+    found = library.each(lambda key: double(fit, key, library, names, slopes), keys)
+    return {key: name for key, name in zip(keys, found, strict=True) if name}
 
 
-def double(fit: Fit, key: EffectKey, library: Library) -> str:
-    """Return the parameter of the declared model that does what an effect does, "" for none."""
-    records, slopes = beside(fit, (key,), library), fit.jacobian
+def double(fit: Fit, key: EffectKey, library: Library, own: list[str], slopes: Array) -> str:
+    """Return what of the declared model does what an effect does, "" for nothing.
+
+    own: its parameters, and constants; slopes: change of the whitened signal by each, (n_samples, n).
+    """
+    records = beside(fit, (key,), library)
     known, declared = strengths(records, library), records.model.parameters
     names = known.get(key, [])
-    company = [n for other, own in known.items() if other.public != key.public for n in own]
-    if len(names) != 1 or not company or not fit.n_free:
+    company = [n for other, theirs in known.items() if other.public != key.public for n in theirs]
+    if len(names) != 1 or not company or not own:
         return ""
     alone, step = candidate_at(records, fit.values), SLOPE * library.strength_of(names[0], declared[names[0]])
     response, squares = change_by(records, alone, names[0], step), np.maximum(np.sum(slopes**2, axis=0), 1e-300)
@@ -130,7 +139,7 @@ def double(fit: Fit, key: EffectKey, library: Library) -> str:
     best = int(np.argmax(along**2 * squares))
     if not along[best] ** 2 * squares[best] > PARALLEL * float(response @ response):
         return ""
-    name, change, at_work = list(fit.values)[best], along[best] * float(fit.records.span[best]), alone.copy()
+    name, change, at_work = own[best], float(along[best]), alone.copy()
     for other in company:
         at_work[records.space.index(other)] += COMPANY * library.strength_of(other, declared[other])
     response = change_by(records, at_work, names[0], step)
@@ -144,10 +153,15 @@ def double(fit: Fit, key: EffectKey, library: Library) -> str:
 
 
 def change_by(records: WhiteRecords, candidate: Array, name: str, change: float) -> Array:
-    """Return the change of the whitened signal where one parameter of a whole candidate changes, (n_samples,)."""
-    both = np.tile(candidate, (2, 1))
-    both[1, records.space.index(name)] += change
-    still, moved = records.whole_signals(both)
+    """Return the change of the whitened signal where a parameter of a candidate changes, or a constant by a share.
+
+    (n_samples,).
+    """
+    both, shares = np.tile(candidate, (2, 1)), {name: np.array([0.0, change])}
+    if name in records.space.names:
+        both[1, records.space.index(name)] += change
+        shares = {}
+    still, moved = records.whole_signals(both, shares)
     return np.asarray(moved - still)
 
 
