@@ -8,7 +8,14 @@ import pytest
 from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 
-from armid.estimation.noise_model import coloured_level, white_level, yule_walker
+from armid.estimation.noise_model import (
+    alternating_level,
+    coloured_level,
+    growing_level,
+    log_density,
+    white_level,
+    yule_walker,
+)
 from armid.inference.checks import motion_phases, spectra, square_along, time_in_words
 from armid.inference.model import decomposed
 from armid.inference.whitening import soundness
@@ -60,6 +67,21 @@ def test_coloured_noise_counts_fewer_samples():
     # 1 + 2 sum 0.9^k = 19 and 1 + 2 sum 0.81^k = 9.53 for this autoregression.
     assert level.n_samples / level.n_slow == pytest.approx(19.0, rel=0.15)
     assert level.n_samples / level.n_power == pytest.approx(1 + 2 * 0.81 / 0.19, rel=0.15)
+
+
+def test_noise_in_motion_is_found_and_turned_white():
+    rng, reading = np.random.default_rng(5), np.linspace(-40.0, 60.0, 20_000)
+    grown = np.hypot(0.2, 0.01 * reading) * rng.standard_normal(reading.size)
+    level = growing_level([reading], [grown])
+    assert (level.still, level.growth) == pytest.approx((0.2, 0.01), rel=0.05)
+    assert np.std(level.white(grown, [reading.size]) * level.weights(reading)) == pytest.approx(1.0, rel=0.02)
+    assert log_density(level, reading, grown) > log_density(white_level(np.std(grown), 0), reading, grown) + 100.0
+    white = rng.standard_normal(20_001)
+    level = alternating_level([white[1:] - 0.9 * white[:-1]])
+    assert (level.alternation, level.innovation) == pytest.approx((0.9, 1.0), rel=0.02)
+    covariance = toeplitz([1.81, -0.9, *np.zeros(38)])
+    exact = replace(level, alternation=0.9, innovation=1.0)
+    np.testing.assert_allclose(exact.white(exact.white(covariance, [40]).T, [40]), np.eye(40), atol=1e-12)
 
 
 def test_when_a_residual_is_no_noise_is_told_by_what_the_motion_does():

@@ -130,6 +130,46 @@ def test_what_the_added_effect_cannot_be_told_apart_from_widens_its_own_strength
         assert all(fit.chi2 < 1.01 * other.chi2 for other in less), model
 
 
+COUNTS, DRAG = 2000.0, 1.2e-3
+
+
+def by_reading(motion, rng):
+    """Speed with a noise of 0.02 rad/s at rest and of 2 % of the reading beside it."""
+    return motion[:, 1] + np.hypot(0.02, 0.02 * motion[:, 1]) * rng.normal(size=len(motion))
+
+
+def from_counts(motion, rng):
+    """Speed as the difference of counts over a sample."""
+    counts = np.floor(motion[:, 0] / (2.0 * np.pi) * COUNTS + rng.random())
+    return np.diff(counts, prepend=counts[0]) * 2.0 * np.pi / COUNTS / 0.01
+
+
+def dragged(x, fed):
+    return turning(x, fed) - np.array([0.0, DRAG * x[1] * abs(x[1]) / INERTIA])
+
+
+@pytest.mark.parametrize("sensor", [by_reading, from_counts])
+def test_noise_that_no_rest_tells_is_nothing_that_the_machine_lacks(tmp_path, sensor):
+    rng, files = np.random.default_rng(31), []
+    for _ in range(4):
+        voltage = np.repeat(rng.uniform(-9.0, 9.0, 15), 40)
+        voltage[:60] = 0.0
+        speed = sensor(moved(dragged, voltage, 0.01, (0.0, 0.0), "zero", 4), rng)
+        files.append({"time_s": 0.01 * np.arange(len(voltage)), "voltage_V": voltage, "angular_velocity_rad_s": speed})
+    records = campaign(tmp_path, DISC, files)
+    found = close_loop(records.model(), records, {n: EFFECTS[n] for n in ("quadratic_drag", "output_delay", "cogging")})
+    chances = found.inference.probabilities
+    assert chances["unknown"] < 0.1
+    assert chances["effects"]["quadratic_drag"] > 0.9
+    assert "cogging" not in found.effects
+    # a difference over a sample is the speed half a sample ago
+    assert (chances["effects"].get("output_delay", 0.0) > 0.9) == (sensor is from_counts)
+    assert found.outputs["angular_velocity"]["noise_in_motion"]
+    estimates = {e.name: e for e in found.after.estimates}
+    assert estimates["inertia"].low < INERTIA < estimates["inertia"].high
+    assert estimates["quadratic_drag.c"].low < DRAG < estimates["quadratic_drag.c"].high
+
+
 STICKING = """\
 name = "wheel"
 plant = "rotary_arm"
