@@ -91,7 +91,7 @@ class Inference:
 
     @property
     def named(self) -> list[Hypotheses]:
-        """The models whose parts all have names, the most probable first; an effect at its null is no part of one."""
+        """The models whose parts all have names, the most probable first; an effect at its null is left out."""
         models = [m for m, _ in self.exploration.ranked() if not any(h.kind == "unknown" for h in m)]
         return [m for m in models if not self.exploration.fits[m].has_idle_effect]
 
