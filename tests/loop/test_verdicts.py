@@ -170,7 +170,8 @@ def test_a_limit_that_holds_a_parameter_is_told():
     at_limit = Estimate("n", 1.5, "1", 1.4, 1.6, (HELD,))
     other = Estimate("p0", 3e6, "Pa", 2.9e6, 3.1e6, ())
     length = Estimate("x.width", 0.02, "m", 0.01, 0.03, ("something else", HELD))
-    said = limits_of(SimpleNamespace(estimates=(at_limit, other, length)))
+    at_zero = Estimate("viscous.slope", 0.0, "N s/m", 0.0, 0.1, (HELD,))
+    said = limits_of(SimpleNamespace(estimates=(at_limit, other, length, at_zero)))
     assert [s.partition(":")[0] for s in said] == ["n sits at its limit 1.5", "x.width sits at its limit 0.02 m"]
     assert said[0].endswith("widen it (--bounds n=LOW:HIGH), or fix it.")
 

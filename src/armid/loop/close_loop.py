@@ -273,8 +273,8 @@ def verdicts_of(
 
 
 def limits_of(judged: Judgement) -> list[str]:
-    """Return which limits hold a parameter: nobody else is accused of what they cause."""
-    held = [e for e in judged.estimates if HELD in e.doubts]
+    """Return which limits hold a parameter: nobody else is accused of what they cause. 0 is an end of physics."""
+    held = [e for e in judged.estimates if HELD in e.doubts and e.value]
     return [f"{e.name} sits at its limit {e.value:.4g}{'' if e.unit == '1' else ' ' + e.unit}: widen it (--bounds "
             f"{e.name}=LOW:HIGH), or fix it." for e in held]  # fmt: skip
 

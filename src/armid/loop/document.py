@@ -429,7 +429,7 @@ def declared_by(loop: ClosedLoop) -> str:
             continue
         if name in library.fixed_shapes(owner):
             options.append(f"--fix {library.public(name)}={value:.6g}")
-        elif null is not None:
+        elif null not in (None, value):  # at its null a strength has no range
             low, high = sorted((null, null + SEARCHED_TO * (value - null)))
             options.append(f"--bounds {library.public(name)}={low:.3g}:{high:.3g}")
     return f"`armid identify` declares this model with `--effects {' '.join(options)}`."
