@@ -1,9 +1,13 @@
 """What does not carry over is reported: how far records are missed, what is new in them, what may have changed."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import armid
+from armid.inference.carry_over import Missed
+from armid.model import PLANTS
 from synthetic import write_records
 
 pytestmark = pytest.mark.slow
@@ -44,6 +48,15 @@ def test_a_record_of_more_drive_than_any_train_record(tmp_path):
     assert "drive_effort reaches" in said
     assert found.after.missed[0].factor > 10.0
     assert found.effects == ()
+
+
+def test_a_new_range_is_told_in_its_unit_where_that_is_known():
+    ranges = {"voltage": (7.39, 5.0, "V"), "duty": (0.616, 0.5, "1"), "something": (3.0, 1.0, "")}
+    said = Missed("held.csv", 9.0, (2.0, 1.0), "m/s", ranges, {}).sentence
+    assert ": voltage reaches 7.39 V (train: 5), duty reaches 0.616 (train: 0.5), something reaches 3 (train" in said
+    plant = replace(PLANTS["driven_axis"], ports={**PLANTS["driven_axis"].ports, "winding": "V"})
+    units = {"v": "m/s", "u": "", "voltage": "V", "drive_effort": "N", "time": "s"}
+    assert {name: plant.unit_of(name) for name in units} == units
 
 
 def test_a_parameter_that_changed_between_the_records(tmp_path):

@@ -27,7 +27,7 @@ from armid.problem.problem import Replay
 from armid.record import Campaign, Record
 from armid.report.document import curve_entry, plain
 from armid.report.result import LOOP, Kind, Result
-from armid.units import shown
+from armid.units import behind, shown
 
 IMPLAUSIBLE, DISAGREES, CARRIES_NOT, NO_DISCREPANCY, EXPLAINED, PARTLY, UNEXPLAINED, TOO_ALIKE = (
     "implausible_records", "record_disagrees", "does_not_carry_over", "no_discrepancy", "explained",
@@ -449,7 +449,7 @@ def along(value: float, low: float, high: float) -> tuple[float, float]:
 
 def fault_sentence(s: RecordFault) -> str:
     factor, name = shown(1.0, s.unit)
-    unit = "" if name == "1" else f" {name}"
+    unit = behind(name)
     if s.kind in ("gap", "clipped", "stuck", "spikes"):
         words = {"gap": "bridged over a gap", "clipped": "clipped", "stuck": "repeated", "spikes": "spikes"}[s.kind]
         where = f"from {s.from_s:.4g} to {s.to_s:.4g} s"
