@@ -1,5 +1,6 @@
 """What a posterior and the errors on held-out records come to: steps that stand, verdicts, claims, what is told."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -133,6 +134,15 @@ def test_what_may_stand_in_the_place_of_an_effect():
     assert partners == pytest.approx({"stribeck": 0.25, "seal": 0.2})
     assert list(partners) == ["stribeck", "seal"], "the most probable first"
     assert found.partners(model, effect("viscous")) == {}
+
+
+def test_the_name_in_force_is_the_most_probable_whatever_its_forms_share():
+    late, drag = effect("late"), effect("drag")
+    models = {late: 0.0, replace(drag, form="a"): -0.6, drag: -0.6, Hypothesis("unknown", "torque"): 1.0}
+    ranked = [(frozenset({h}), p) for h, p in sorted(models.items(), key=lambda pair: -pair[1])]
+    found = Inference(SimpleNamespace(ranked=lambda: ranked), posterior(("drag", 0.52), ("late", 0.48)))
+    assert [h.name for (h,) in found.named] == ["drag", "drag", "late"]
+    assert found.in_force == ranked[2][0]
 
 
 def test_the_way_to_a_model_goes_by_its_most_probable_parts():

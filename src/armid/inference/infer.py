@@ -91,8 +91,13 @@ class Inference:
 
     @property
     def named(self) -> list[Hypotheses]:
-        """The models whose parts all have names, the most probable first."""
-        return [m for m, _ in self.exploration.ranked() if not any(h.kind == "unknown" for h in m)]
+        """The models whose parts all have names, by the probability of the names, whose forms share it; then by own."""
+        ranked = [(m, p) for m, p in self.exploration.ranked() if not any(h.kind == "unknown" for h in m)]
+        sums: dict[frozenset[tuple[str, str]], float] = {}
+        for model, p in ranked:
+            names = frozenset(h.public for h in model)
+            sums[names] = float(np.logaddexp(sums.get(names, -np.inf), p))
+        return sorted((m for m, _ in ranked), key=lambda m: -sums[frozenset(h.public for h in m)])
 
     def without(self, denied: Hypotheses, standing: Hypotheses) -> "Inference":
         """Return what is probable where held-out records deny some hypotheses; standing: the model that is left."""

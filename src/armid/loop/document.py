@@ -370,7 +370,7 @@ def models_of(inference: Inference) -> list[dict[str, Any]]:
                 "model": words(model), "probability": probability,
                 "parameters": {n: {"value": values[n], "low": i.low, "high": i.high} for n, i in known.items()},
             }  # fmt: skip
-    return list(entries.values())
+    return sorted(entries.values(), key=lambda entry: -entry["probability"])
 
 
 def conclusion(loop: ClosedLoop) -> str:
