@@ -7,6 +7,7 @@ import pytest
 
 import armid
 from armid.inference.carry_over import Missed
+from armid.loop.document import conclusion
 from armid.model import PLANTS
 from synthetic import write_records
 
@@ -34,9 +35,10 @@ def table(amplitude, seed, inertia=INERTIA, most=np.inf):
     return {"time_s": STEP * np.arange(N), "angular_velocity_rad_s": measured, "drive_V": drive}
 
 
-def closed(folder, **held):
+def closed(folder, n_held=1, **held):
     tables = {"a.csv": table(1.0, 1), "b.csv": table(1.0, 2), "held.csv": table(seed=3, **held)}
-    campaign = write_records(folder / "axis", HEAD, tables)
+    tables |= {f"held_{i}.csv": table(seed=3 + i, **held) for i in range(1, n_held)}
+    campaign = write_records(folder / "axis", HEAD, tables, n_held)
     return armid.close_loop(campaign, candidates=["torque_offset"], curve=False)
 
 
@@ -47,6 +49,8 @@ def test_a_record_of_more_drive_than_any_train_record(tmp_path):
     assert said.startswith("held.csv")
     assert "drive_effort reaches" in said
     assert found.after.missed[0].factor > 10.0
+    assert conclusion(found).endswith("may itself be faulty, for example late or scaled.")
+    assert "faulty" not in conclusion(closed(tmp_path / "two", 2, amplitude=4.0, most=2.0))
     assert found.effects == ()
 
 

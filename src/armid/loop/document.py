@@ -10,7 +10,7 @@ from armid.errors import ArmidError
 from armid.estimation.identify import versions_of
 from armid.estimation.identify_document import PACKAGES_OF_IDENTIFY
 from armid.inference.candidates import ERROR_OF
-from armid.inference.carry_over import missed_sentences
+from armid.inference.carry_over import missed_sentences, over_noise
 from armid.inference.checks import Finding, Residuals, time_in_words
 from armid.inference.decisions import LISTED, OVER_NOISE, SIGNIFICANCE
 from armid.inference.hypothesis import words
@@ -469,12 +469,15 @@ def carried_sentence(loop: ClosedLoop) -> str:
     missed = f"{unseen.data.each[worst].file} is missed by {factors[worst]:.3g} times its noise"
     if not np.isfinite(factors[worst]):
         missed = f"{unseen.data.each[worst].file} makes the simulation diverge"
+    alone = ""
+    if sum(over_noise(judged.train, unseen)) == 1:
+        alone = " No other held-out record is missed: this one may itself be faulty, for example late or scaled."
     if loop.withdrawn is None and judged.diagnosis.significant:
         named = f"With {' + '.join(loop.effects)} the declared model" if loop.effects else "The declared model"
-        return f"{named} leaves more than noise on the train records. {missed_sentences(judged.missed)[0]}"
+        return f"{named} leaves more than noise on the train records. {missed_sentences(judged.missed)[0]}{alone}"
     if loop.withdrawn is None:
         return (f"Only noise remains on the train records, but of the held-out records {missed}: something acts there "
-                "that the train records do not show.")  # fmt: skip
+                f"that the train records do not show.{alone}")  # fmt: skip
     last = loop.after.holdout
     assert last is not None
     worse = unseen.errors.joint_nrmse / last.errors.joint_nrmse - 1.0
