@@ -93,7 +93,7 @@ def test_one_file_of_steps_tells_that_the_drive_is_held(run, tmp_path):
         assert run("new", "campaign", f"c{i}", "--from", *files).code == 0
         text = (tmp_path / f"c{i}" / "campaign.toml").read_text()
         assert tomllib.loads(text)["hold"] == hold
-    assert "from row to row in 1 of 2 files" in text
+    assert "constant between two rows, as its steps in 1 of the 2 files show" in text
 
 
 def test_a_parameter_among_the_constants_is_refused_with_the_key_to_write(run, refused, tmp_path):

@@ -408,8 +408,8 @@ def guessed_text(
     drives = [columns[renamed[roles["drive"].header]] for columns in written.values()]
     # One device drives all records: steps show that it holds, a chirp cannot.
     held = [float(np.mean(np.diff(drive) == 0.0)) > KEPT for drive in drives]
-    stays = f"keeps its value from row to row in {held.count(True)} of {len(held)} files"
-    kept = ("zero", stays) if any(held) else ("linear", "changes in each row")
+    steps = f"is constant between two rows, as its steps in {held.count(True)} of the {len(held)} files show"
+    kept = ("zero", steps) if any(held) else ("linear", "runs straight between two rows, as it changes in each row")
     lines = [
         "# Written by `armid new campaign --from`: check each line with GUESS. The CSV files are copies with",
         "# headers that armid reads. Numbers are those of the originals unless a line says so, times are in",
