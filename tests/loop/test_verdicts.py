@@ -12,6 +12,7 @@ from armid.inference.hypothesis import Hypothesis
 from armid.inference.posterior import Atom, Posterior
 from armid.loop import Judgement, Step
 from armid.loop.close_loop import confirmed, is_denied, limits_of, path_of, steps_of, verdicts_of
+from armid.loop.document import diagnosis_sentences
 from armid.loop.figures import diagnosis_figure, ends_of, parameter_figure
 from armid.loop.result import HELD, Estimate, Withdrawn
 from armid.report.style import pyplot
@@ -184,6 +185,15 @@ def test_a_limit_that_holds_a_parameter_is_told():
     said = limits_of(SimpleNamespace(estimates=(at_limit, other, length, at_zero)))
     assert [s.partition(":")[0] for s in said] == ["n sits at its limit 1.5", "x.width sits at its limit 0.02 m"]
     assert said[0].endswith("widen it (--bounds n=LOW:HIGH), or fix it.")
+
+
+@pytest.mark.parametrize(("known", "where"), [([False], ""), ([True, False, True], " of 1 of 3 signals")])
+def test_noise_that_no_rest_tells_is_told_of_the_records_that_lack_one(known, where):
+    levels = [SimpleNamespace(known=each) for each in known]
+    diagnosis = Diagnosis((Finding("autocorrelation", "all", 9.0, 1e-9),), False)
+    seen = {"data": SimpleNamespace(known=False, levels=levels), "residual": np.ones(4), "stages": {}, "phases": {}}
+    said = diagnosis_sentences(SimpleNamespace(diagnosis=diagnosis, **seen))
+    assert said[1] == f"No rest tells the noise{where}: the residual is tested against itself."
 
 
 def test_an_interval_is_drawn_as_it_is_and_not_about_its_value():

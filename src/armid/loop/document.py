@@ -110,6 +110,8 @@ PROBABILITIES_NOTE = (
     "explain the records instead."
 )
 
+UNNAMED = "the plant has no port for them, a free parameter does the same, or they were left out by name."
+
 
 def loop_document(
     report: Mapping[str, Any], details: Mapping[str, Any], svgs: Mapping[str, str], again: str
@@ -207,7 +209,9 @@ def probability_table(report: Mapping[str, Any]) -> Table:
     rows += [("something that the library does not hold", chances["unknown"], "", ""),
              ("nothing", chances["nothing"], "", "")]  # fmt: skip
     columns = ["what", Column("probability", "probability", ".2f"), "kind", "in its place"]
-    return table("Probabilities", columns, rows, PROBABILITIES_NOTE)
+    named, known = chances["among"]
+    others = f" {known - named} effects are not named: {UNNAMED}" if named < known else ""
+    return table("Probabilities", columns, rows, PROBABILITIES_NOTE + others)
 
 
 def error_sentence(report: Mapping[str, Any]) -> str:
@@ -527,7 +531,9 @@ def diagnosis_sentences(seen: Residuals) -> list[str]:
     said = [f"What remains is more than noise (chance {'below ' if diagnosis.p < LEAST_CHANCE else ''}"
             f"{max(diagnosis.p, LEAST_CHANCE):.2g})."]  # fmt: skip
     if not diagnosis.noise_known:
-        said.append("No rest tells the noise: the residual is tested against itself.")
+        levels = seen.data.levels
+        of = f" of {sum(not level.known for level in levels)} of {len(levels)} signals" if levels[1:] else ""
+        said.append(f"No rest tells the noise{of}: the residual is tested against itself.")
     wholes = {
         "size": "Its mean square is {ratio:.4g} times that of the noise.",
         "repeats": "Repeats of {where} agree with each other {ratio:.3g} times better than with the model (mean "
