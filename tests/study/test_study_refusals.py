@@ -42,7 +42,7 @@ REFUSED = [
      "needs residual vectors, fitness 'similarity' has none: rmse or likelihood is expected"),
     ('name = "pso+least_squares"', 'name = "pso+least_squares"\nfitness = "likelihood"',
      "fitness 'likelihood' needs noise, but noise_deg_s holds 0"),
-    ("[[0.0, 0.3]]", "[[0.29, 0.7]]", "case 'row 1', manoeuvre 1: the window holds 11 samples of manoeuvre 1"),
+    ("[[0.0, 0.3]]", "[[0.29, 0.7]]", "manoeuvre 1, windows_s: the window holds 11 samples of manoeuvre 1"),
     ("start_angle_deg = -48.0", "start_angle_deg = -60.0", "case 'row 1', manoeuvre 1: start_angle_deg is -60"),
     ('"row 5"', '"row 1"', "case 'row 1' is there twice"),
     ('fitness = "rmse"', 'fitness = ["rmse", "rmse"]', "the same run is asked for twice (fitness rmse, window"),
