@@ -162,6 +162,7 @@ def test_ellipses_of_the_most_correlated_pairs_with_the_truth(lowering_found):
     correlation = np.abs(information.correlation[np.triu_indices(4, 1)])
     shown = [abs(float(axis.get_title().split()[1])) for axis in figure.axes]
     assert shown == pytest.approx(sorted(correlation, reverse=True), abs=1e-3)
+    assert max(len(a.xaxis.get_major_locator().tick_values(*a.get_xlim())) for a in figure.axes) <= 4
     axis = next(a for a in figure.axes if (a.get_xlabel(), a.get_ylabel()) == ("p0 [MPa]", "n"))
     x, y = axis.patches[0].get_xy().T
     ends = [axis.lines[0].get_xdata()[0] + s * 2.4477e-6 * information.deviation[0] for s in (-1.0, 1.0)]
