@@ -14,7 +14,7 @@ from armid.loop import Judgement, Step
 from armid.loop.close_loop import confirmed, is_denied, limits_of, path_of, steps_of, verdicts_of
 from armid.loop.document import diagnosis_sentences
 from armid.loop.figures import diagnosis_figure, ends_of, parameter_figure
-from armid.loop.result import HELD, Estimate, Withdrawn
+from armid.loop.result import HELD, Estimate, Withdrawn, spelled
 from armid.report.style import pyplot
 
 QUIET, LOUD = SimpleNamespace(significant=False), SimpleNamespace(significant=True)
@@ -135,6 +135,14 @@ def test_what_may_stand_in_the_place_of_an_effect():
     assert partners == pytest.approx({"stribeck": 0.25, "seal": 0.2})
     assert list(partners) == ["stribeck", "seal"], "the most probable first"
     assert found.partners(model, effect("viscous")) == {}
+
+
+def test_models_of_the_table_are_told_apart_by_forms_and_variables():
+    over = [Hypothesis("unknown", "torque", variable) for variable in ("v", "time (0.2 of a record)")]
+    assert [spelled(h) for h in (*over, replace(effect("drag"), form="tanh"), effect("drag"), LATE)] == [
+        "something at torque, over v", "something at torque, over time (0.2 of a record)", "drag:tanh", "drag",
+        "late@a.csv",
+    ]  # fmt: skip
 
 
 def test_the_name_in_force_is_the_most_probable_whatever_its_forms_share():

@@ -373,9 +373,9 @@ def of_output(replay: Replay, candidate: Array) -> JointErrors:
 
 
 def spelled(hypothesis: Hypothesis) -> str:
-    """Return a hypothesis in words, an effect with the word of its form."""
-    form = f":{hypothesis.form}" if hypothesis.kind == "effect" and hypothesis.form else ""
-    return f"{words([hypothesis])}{form}"
+    """Return a hypothesis in words, an effect with the word of its form, an unknown signal with what it follows."""
+    joint = {"effect": ":", "unknown": ", over "}.get(hypothesis.kind, "")
+    return f"{words([hypothesis])}{joint}{hypothesis.form}" if hypothesis.form and joint else words([hypothesis])
 
 
 def log_of(inference: Inference) -> list[dict[str, Any]]:
