@@ -129,7 +129,7 @@ class Inference:
 
     @property
     def probabilities(self) -> dict[str, Any]:
-        """What is probable: effects, sets, nothing, unknown, records, drifts, and constants in tolerances."""
+        """What is probable: effects, sets, nothing, unknown, records, drifts; and constants, in their tolerances."""
         post = self.posterior
         return {
             "effects": listed(post.of_kind("effect")),
