@@ -210,8 +210,8 @@ def probability_table(report: Mapping[str, Any]) -> Table:
              ("nothing", chances["nothing"], "", "")]  # fmt: skip
     columns = ["what", Column("probability", "probability", ".2f"), "kind", "in its place"]
     named, known = chances["among"]
-    others = f" {known - named} effects are not named: {UNNAMED}" if named < known else ""
-    return table("Probabilities", columns, rows, PROBABILITIES_NOTE + others)
+    why = f" {known - named} effects are not named: {UNNAMED}" if named < known else ""
+    return table("Probabilities", columns, rows, PROBABILITIES_NOTE + why)
 
 
 def error_sentence(report: Mapping[str, Any]) -> str:
