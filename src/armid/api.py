@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from armid.errors import ArmidError, DataError, ModelError, nearest, quoted
+from armid.errors import ArmidError, DataError, ModelError, nearest, nearest_registered, quoted
 from armid.model import Effect, Manoeuvre, Model, Plant, fitting_form, refusal_of
 from armid.model.effects.sensor import sensor_effects
 from armid.model.parameter import warn_if_far
@@ -161,7 +161,7 @@ def effect_of(given: Any, effects: Mapping[str, Effect], plant: Plant) -> Effect
 
 def chosen(name: str, known: Mapping[str, object], what: str) -> Any:
     if name not in known:
-        raise ModelError(f"{what} '{name}' is not known: {nearest(str(name), known)}")
+        raise ModelError(f"{what} '{name}' is not known: {nearest_registered(str(name), known)}")
     return known[name]
 
 

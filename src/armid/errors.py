@@ -84,6 +84,12 @@ def nearest(word: str, known: Iterable[str]) -> str:
     return f"known: {', '.join(words)}" if words else "there is none"
 
 
+def nearest_registered(word: str, known: Iterable[str]) -> str:
+    """Return `nearest` among what plug-ins add to; where none is near, how one of the user's own is named."""
+    hint = nearest(word, known)
+    return hint if hint.endswith("?") else f"{hint}; one of your own is a plug-in, FILE.py:NAME in `plugins`"
+
+
 BRIEF = reprlib.Repr()
 BRIEF.maxstring = BRIEF.maxother = BRIEF.maxlong = 60
 BRIEF.maxlist = 12

@@ -75,6 +75,20 @@ def scale_of(unit: str, size: float = 1.0) -> tuple[str, float]:
     return f"{PREFIXES[prefix]}{unit}", 1.0 / prefix
 
 
+def behind(unit: str) -> str:
+    """Return a unit as it stands behind a number; nothing for 1, and for one that is not known."""
+    return "" if unit in ("", "1") else f" {unit}"
+
+
+def labelled(name: str, unit: str) -> str:
+    """Return the label of an axis.
+
+    >>> labelled("voltage", "V"), labelled("duty", "1")
+    ('voltage [V]', 'duty')
+    """
+    return f"{name} [{unit}]" if behind(unit) else name
+
+
 def shown(value: float, unit: str) -> tuple[float, str]:
     """Return a value in the unit that people read.
 

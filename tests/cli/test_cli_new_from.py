@@ -1,6 +1,7 @@
 """`armid new campaign NAME --from FILE...` guesses what the columns of files are, says so, and its campaign checks."""
 
 import tomllib
+from pathlib import Path
 from warnings import catch_warnings, simplefilter
 
 import numpy as np
@@ -93,7 +94,7 @@ def test_one_file_of_steps_tells_that_the_drive_is_held(run, tmp_path):
         assert run("new", "campaign", f"c{i}", "--from", *files).code == 0
         text = (tmp_path / f"c{i}" / "campaign.toml").read_text()
         assert tomllib.loads(text)["hold"] == hold
-    assert "from row to row in 1 of 2 files" in text
+    assert "constant between two rows, as its steps in 1 of the 2 files show" in text
 
 
 def test_a_parameter_among_the_constants_is_refused_with_the_key_to_write(run, refused, tmp_path):
@@ -166,3 +167,15 @@ def test_an_unknown_unit_and_a_time_that_falls_are_refused(refused, tmp_path):
     plain_file(tmp_path / "b.csv", "U [V]", lambda t: np.where(np.arange(N) < 900, t, t - 2.0))
     assert "time does not rise from row 900 to row 901" in refused("new", "campaign", "wheel", "--from", "b.csv")
     assert not (tmp_path / "wheel").exists()
+
+
+def test_the_plant_of_a_plug_in_is_the_one_of_the_campaign(run, refused):
+    times, drive, speed, _ = wheel(5)
+    write(Path("a.csv"), "t_s,motor_V,speed_rad_s", times, drive, speed)
+    plugin = f"{Path(__file__).parents[1] / 'winch.py'}:winch"
+    made = run("new", "campaign", "mine", "--from", "a.csv", "--plugin", plugin)
+    assert made.out == f"wrote mine; try: armid check mine --plugin {plugin}\n"
+    toml = tomllib.loads(Path("mine/campaign.toml").read_text())
+    assert (toml["plant"], toml["inputs"]) == ("winch", {"volts": "drive_V"})
+    assert run("check", "mine", "--plugin", plugin).code == 0
+    assert "a campaign that is made by --from is expected" in refused("new", "effect", "x", "--plugin", plugin)

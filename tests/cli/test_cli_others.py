@@ -41,6 +41,12 @@ def test_list_plants(run):
         assert line in text
 
 
+def test_an_effect_of_the_sensor_of_a_plant_is_listed_by_its_name(run):
+    text = run("list", "effects", "hub_angle_scale").out
+    assert "hub_angle_scale: error of hub_angle in proportion to it" in text
+    assert text.rstrip().endswith("on flexible_link")
+
+
 @pytest.mark.parametrize(("what", "name", "line"), [
     ("effects", "cubic_drag", "port torque += -c * omega ** 3"),
     ("fitness", "largest_miss", "largest_miss: a function of the user (records join by duration)"),

@@ -123,7 +123,9 @@ def test_a_residual_of_little_more_than_noise_is_told(stand, tmp_path, key, noti
     found = identify(read, model, space_of(model), FITNESS["rmse"], IDENTIFIERS["least_squares"])
     assert found.train.chi2_per_sample < 2.5
     assert found.information.levels[0].from_residual is noticed
-    said = "\n".join(answer(result_of(found), details_of(found)))
+    details = details_of(found) | {"within_tolerances": ["R (0.03)"]}
+    said = "\n".join(answer(result_of(found), details))
+    assert " (constants count as exact): " in said
     assert "no record was held out, so that nothing judges the model" in said
     assert ("do not rely on the 95 % intervals" in said) is noticed
 
@@ -160,7 +162,8 @@ def test_ellipses_of_the_most_correlated_pairs_with_the_truth(lowering_found):
     correlation = np.abs(information.correlation[np.triu_indices(4, 1)])
     shown = [abs(float(axis.get_title().split()[1])) for axis in figure.axes]
     assert shown == pytest.approx(sorted(correlation, reverse=True), abs=1e-3)
-    axis = next(a for a in figure.axes if (a.get_xlabel(), a.get_ylabel()) == ("p0 [MPa]", "n [1]"))
+    assert max(len(a.xaxis.get_major_locator().tick_values(*a.get_xlim())) for a in figure.axes) <= 4
+    axis = next(a for a in figure.axes if (a.get_xlabel(), a.get_ylabel()) == ("p0 [MPa]", "n"))
     x, y = axis.patches[0].get_xy().T
     ends = [axis.lines[0].get_xdata()[0] + s * 2.4477e-6 * information.deviation[0] for s in (-1.0, 1.0)]
     assert (x.min(), x.max()) == pytest.approx(tuple(ends), rel=1e-6)

@@ -1,9 +1,14 @@
 """What does not carry over is reported: how far records are missed, what is new in them, what may have changed."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import armid
+from armid.inference.carry_over import Missed
+from armid.loop.document import conclusion
+from armid.model import PLANTS
 from synthetic import write_records
 
 pytestmark = pytest.mark.slow
@@ -30,9 +35,10 @@ def table(amplitude, seed, inertia=INERTIA, most=np.inf):
     return {"time_s": STEP * np.arange(N), "angular_velocity_rad_s": measured, "drive_V": drive}
 
 
-def closed(folder, **held):
+def closed(folder, n_held=1, **held):
     tables = {"a.csv": table(1.0, 1), "b.csv": table(1.0, 2), "held.csv": table(seed=3, **held)}
-    campaign = write_records(folder / "axis", HEAD, tables)
+    tables |= {f"held_{i}.csv": table(seed=3 + i, **held) for i in range(1, n_held)}
+    campaign = write_records(folder / "axis", HEAD, tables, n_held)
     return armid.close_loop(campaign, candidates=["torque_offset"], curve=False)
 
 
@@ -43,7 +49,18 @@ def test_a_record_of_more_drive_than_any_train_record(tmp_path):
     assert said.startswith("held.csv")
     assert "drive_effort reaches" in said
     assert found.after.missed[0].factor > 10.0
+    assert conclusion(found).endswith("may itself be faulty, for example late or scaled.")
+    assert "faulty" not in conclusion(closed(tmp_path / "two", 2, amplitude=4.0, most=2.0))
     assert found.effects == ()
+
+
+def test_a_new_range_is_told_in_its_unit_where_that_is_known():
+    ranges = {"voltage": (7.39, 5.0, "V"), "duty": (0.616, 0.5, "1"), "something": (3.0, 1.0, "")}
+    said = Missed("held.csv", 9.0, (2.0, 1.0), "m/s", ranges, {}).sentence
+    assert ": voltage reaches 7.39 V (train: 5), duty reaches 0.616 (train: 0.5), something reaches 3 (train" in said
+    plant = replace(PLANTS["driven_axis"], ports={**PLANTS["driven_axis"].ports, "winding": "V"})
+    units = {"v": "m/s", "u": "", "voltage": "V", "drive_effort": "N", "time": "s"}
+    assert {name: plant.unit_of(name) for name in units} == units
 
 
 def test_a_parameter_that_changed_between_the_records(tmp_path):

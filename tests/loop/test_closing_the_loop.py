@@ -346,6 +346,8 @@ def test_identify_takes_what_was_found_by_the_options_that_are_printed(axis):
     slope = next(e.value for e in found.after.estimates if e.name == name)
     assert again.parameters[name].value == pytest.approx(slope, rel=1e-3)
     assert declared_by(armid.close_loop(campaign, effects=["viscous"], candidates=["coulomb"], curve=False)) == ""
+    at_null = replace(found.after, fit=replace(found.after.fit, z=np.zeros_like(found.after.fit.z)))
+    assert declared_by(replace(found, after=at_null)).endswith(" with `--effects viscous`.")
 
 
 def test_what_is_known_of_a_parameter_beforehand_counts(axis):

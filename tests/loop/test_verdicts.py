@@ -1,5 +1,6 @@
 """What a posterior and the errors on held-out records come to: steps that stand, verdicts, claims, what is told."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -11,8 +12,9 @@ from armid.inference.hypothesis import Hypothesis
 from armid.inference.posterior import Atom, Posterior
 from armid.loop import Judgement, Step
 from armid.loop.close_loop import confirmed, is_denied, limits_of, path_of, steps_of, verdicts_of
+from armid.loop.document import diagnosis_sentences
 from armid.loop.figures import diagnosis_figure, ends_of, parameter_figure
-from armid.loop.result import HELD, Estimate, Withdrawn
+from armid.loop.result import HELD, Estimate, Withdrawn, spelled
 from armid.report.style import pyplot
 
 QUIET, LOUD = SimpleNamespace(significant=False), SimpleNamespace(significant=True)
@@ -135,6 +137,26 @@ def test_what_may_stand_in_the_place_of_an_effect():
     assert found.partners(model, effect("viscous")) == {}
 
 
+def test_models_of_the_table_are_told_apart_by_forms_and_variables():
+    over = [Hypothesis("unknown", "torque", variable) for variable in ("v", "time (0.2 of a record)")]
+    assert [spelled(h) for h in (*over, replace(effect("drag"), form="tanh"), effect("drag"), LATE)] == [
+        "something at torque, over v", "something at torque, over time (0.2 of a record)", "drag:tanh", "drag",
+        "late@a.csv",
+    ]  # fmt: skip
+
+
+def test_the_name_in_force_is_the_most_probable_whatever_its_forms_share():
+    late, drag = effect("late"), effect("drag")
+    models = {late: 0.0, replace(drag, form="a"): -0.6, drag: -0.6, Hypothesis("unknown", "torque"): 1.0}
+    ranked = [(frozenset({h}), p) for h, p in sorted(models.items(), key=lambda pair: -pair[1])]
+    fits = {m: SimpleNamespace(has_idle_effect=False) for m, _ in ranked}
+    found = Inference(SimpleNamespace(ranked=lambda: ranked, fits=fits), posterior(("drag", 0.52), ("late", 0.48)))
+    assert [h.name for (h,) in found.named] == ["drag", "drag", "late"]
+    assert found.in_force == ranked[2][0]
+    fits[ranked[2][0]].has_idle_effect = fits[ranked[3][0]].has_idle_effect = True
+    assert [h.name for (h,) in found.named] == ["late"]
+
+
 def test_the_way_to_a_model_goes_by_its_most_probable_parts():
     a, b, c = map(effect, "abc")
     whole = frozenset({a, b, c, LATE})
@@ -170,9 +192,19 @@ def test_a_limit_that_holds_a_parameter_is_told():
     at_limit = Estimate("n", 1.5, "1", 1.4, 1.6, (HELD,))
     other = Estimate("p0", 3e6, "Pa", 2.9e6, 3.1e6, ())
     length = Estimate("x.width", 0.02, "m", 0.01, 0.03, ("something else", HELD))
-    said = limits_of(SimpleNamespace(estimates=(at_limit, other, length)))
+    at_zero = Estimate("viscous.slope", 0.0, "N s/m", 0.0, 0.1, (HELD,))
+    said = limits_of(SimpleNamespace(estimates=(at_limit, other, length, at_zero)))
     assert [s.partition(":")[0] for s in said] == ["n sits at its limit 1.5", "x.width sits at its limit 0.02 m"]
     assert said[0].endswith("widen it (--bounds n=LOW:HIGH), or fix it.")
+
+
+@pytest.mark.parametrize(("known", "where"), [([False], ""), ([True, False, True], " of 1 of 3 signals")])
+def test_noise_that_no_rest_tells_is_told_of_the_records_that_lack_one(known, where):
+    levels = [SimpleNamespace(known=each) for each in known]
+    diagnosis = Diagnosis((Finding("autocorrelation", "all", 9.0, 1e-9),), False)
+    seen = {"data": SimpleNamespace(known=False, levels=levels), "residual": np.ones(4), "stages": {}, "phases": {}}
+    said = diagnosis_sentences(SimpleNamespace(diagnosis=diagnosis, **seen))
+    assert said[1] == f"No rest tells the noise{where}: the residual is tested against itself."
 
 
 def test_an_interval_is_drawn_as_it_is_and_not_about_its_value():

@@ -78,6 +78,8 @@ def test_terminal_markdown_and_page_give_the_same_answer_first(tmp_path, capsys)
     document = document_of(write_loop(tmp_path / "loop"), LOOP, "x")
     first = document.answer[0]
     assert first == f"{chances_sentence(loop_report())}."
+    named, known = loop_report()["probabilities"]["among"]
+    assert f"{known - named} effects are not named: the plant has no port" in document.sections[0].parts[0].caption
     assert printed(document, capsys).startswith(first)
     text, page = markdown(document), html(document)
     assert text.index(first) < text.index("\n## ")

@@ -42,7 +42,7 @@ REFUSED = [
      "needs residual vectors, fitness 'similarity' has none: rmse or likelihood is expected"),
     ('name = "pso+least_squares"', 'name = "pso+least_squares"\nfitness = "likelihood"',
      "fitness 'likelihood' needs noise, but noise_deg_s holds 0"),
-    ("[[0.0, 0.3]]", "[[0.29, 0.7]]", "case 'row 1', manoeuvre 1: the window holds 11 samples of manoeuvre 1"),
+    ("[[0.0, 0.3]]", "[[0.29, 0.7]]", "manoeuvre 1, windows_s: the window holds 11 samples of manoeuvre 1"),
     ("start_angle_deg = -48.0", "start_angle_deg = -60.0", "case 'row 1', manoeuvre 1: start_angle_deg is -60"),
     ('"row 5"', '"row 1"', "case 'row 1' is there twice"),
     ('fitness = "rmse"', 'fitness = ["rmse", "rmse"]', "the same run is asked for twice (fitness rmse, window"),
@@ -114,3 +114,9 @@ def test_a_path_that_is_no_utf_8_is_refused(refused, write_study, tmp_path, monk
     sentence = refused("study", folder / "small.toml", "--out", "out", "--quiet")
     assert sentence.startswith(r"armid: 'm\udce9s/small.toml' is not a name in UTF-8")
     assert not Path("out").exists()
+
+
+def test_a_folder_that_cannot_be_written_is_one_sentence(write_study, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ArmidError, match="cannot be used: Not a directory, a folder that can be written is expected"):
+        run_study(write_study(more=BOX), out=tmp_path / "file" / "out")

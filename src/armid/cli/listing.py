@@ -48,6 +48,8 @@ def list_command(what: str, names: tuple[str, ...], is_long: bool, plugins: tupl
         raise ArmidError(f"list '{what}' is not known: {nearest(what, KINDS)}")
     registry = load_registry(plugins)
     catalogue = things_of(what, registry)
+    if what == "effects" and names:
+        catalogue = {n: e for plant in registry.plants.values() for n, e in sensor_effects(plant).items()} | catalogue
     for name in names:
         if name not in catalogue:
             raise ArmidError(f"{what}: '{name}' is not known: {nearest(name, catalogue)}")

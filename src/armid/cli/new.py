@@ -20,7 +20,7 @@ import numpy as np
 
 from armid.cli.options import command, completes, examples, give, plugin_option, say
 from armid.errors import ArmidError, nearest, quoted
-from armid.model import Array
+from armid.model import Array, Plant
 from armid.model.effect import RESERVED_WORDS
 from armid.model.parameter import check_name
 from armid.record.sensor import FEWEST_REST_SAMPLES, sensor_of, stands_still
@@ -68,14 +68,18 @@ DIGITS = 6
     help="Folder to write to.",
 )  # fmt: skip
 @click.argument("more", nargs=-1, type=click.Path(path_type=Path), metavar="[FILE]...")
-def new_command(kind: str, name: str, style: str, files: tuple[Path, ...], out: Path, more: tuple[Path, ...]) -> None:
+@plugin_option
+def new_command(
+    kind: str, name: str, style: str, files: tuple[Path, ...], out: Path, more: tuple[Path, ...],
+    plugins: tuple[str, ...],
+) -> None:  # fmt: skip
     """Write a commented starting file of your own that works as it stands.
 
     An effect, a fitness, an identifier, a plant or an analysis becomes FOLDER/NAME.py, a Python file that declares
     NAME. `armid check` tries it, `armid report` an analysis. A study becomes FOLDER/NAME.toml, which `armid study`
     runs. A campaign becomes the folder FOLDER/NAME with campaign.toml and two small records, which are synthetic and
-    say so; with --from FILE... it has copies of your records, and a comment at each guess. Nothing that exists is
-    overwritten.
+    say so; with --from FILE... it has copies of your records, and a comment at each guess; its plant is guessed, or
+    that of --plugin. Nothing that exists is overwritten.
     """
     from armid.record import write_campaign
 
@@ -88,8 +92,11 @@ def new_command(kind: str, name: str, style: str, files: tuple[Path, ...], out: 
     if more and not files:
         raise ArmidError(f"{quoted(str(more[0]))} stands behind the name: --from before the files of a campaign is "
                          "expected")  # fmt: skip
-    template = STYLES.get((kind, style), kind)
-    taken = set(getattr(load_registry(), CATALOGUES[kind]) if kind in CATALOGUES else ())
+    template, registry = STYLES.get((kind, style), kind), load_registry(plugins)
+    plant = next(iter(registry.own["plants"].values()), None)
+    if plugins and (plant is None or not files):
+        raise ArmidError("--plugin: the plant of a campaign that is made by --from is expected")
+    taken = set(getattr(registry, CATALOGUES[kind]) if kind in CATALOGUES else ())
     if kind == "analysis":
         from armid.study.document import ANALYSES
 
@@ -101,13 +108,13 @@ def new_command(kind: str, name: str, style: str, files: tuple[Path, ...], out: 
         raise ArmidError(f"{target} exists already: another name, or another folder by --out, is expected")
     if kind == CAMPAIGN:
         records = [*files, *more]
-        text, tables = guessed_campaign(name, records) if records else (campaign_text(name), synthetic_records())
+        text, tables = guessed_campaign(name, records, plant) if records else (campaign_text(name), synthetic_records())
         write_campaign(target, text, tables)
     else:
         with NewFiles(out) as new_files:
             text = filled("study.toml.txt", name=name) if kind == NEW_STUDY else python_file(template, name)
             new_files.path(target.name).write_text(text, encoding="utf-8")
-    check = trying.format(target)
+    check = " --plugin ".join([trying.format(target), *plugins])
     say(f"wrote {target}; try: {check}")
     give(wrote=target, check=check)
 
@@ -271,9 +278,12 @@ def quantity_of(column: Column) -> str:
     return "position" if column.end in {"deg", "rad", "turns", *SUFFIXES["m"]} else ""
 
 
-def guessed_campaign(name: str, files: Sequence[Path]) -> tuple[str, dict[str, dict[str, Array]]]:
+def guessed_campaign(
+    name: str, files: Sequence[Path], plant: Plant | None = None
+) -> tuple[str, dict[str, dict[str, Array]]]:
     """Return campaign.toml and its tables, file -> header -> values, from CSV files of one machine.
 
+    plant: of the user; None: it is guessed.
     Raises ArmidError where no column of time, motion or drive is found.
     """
     names = [file.name for file in files]
@@ -303,7 +313,7 @@ def guessed_campaign(name: str, files: Sequence[Path]) -> tuple[str, dict[str, d
     notes += [f"not used: {', '.join(map(quoted, unused))}"] if unused else []
     if any(column_of(h).end in COUNT_ENDS for h in unused):
         notes.append("counts of an encoder are an angle as angle_counts, with counts_per_turn in this file")
-    return guessed_text(name, tables, roles, written, renamed, linear, notes), written
+    return guessed_text(name, tables, roles, written, renamed, linear, notes, plant), written
 
 
 def check_unit(quantity: str, column: Column, linear: bool, where: str) -> None:
@@ -403,21 +413,24 @@ def rewritten(
 
 def guessed_text(
     name: str, tables: Sequence[CsvTable], roles: Mapping[str, Column], written: Mapping[str, Mapping[str, Array]],
-    renamed: Mapping[str, str], linear: bool, notes: Sequence[str],
+    renamed: Mapping[str, str], linear: bool, notes: Sequence[str], plant: Plant | None,
 ) -> str:  # fmt: skip
+    model = GUESSED_MODELS[linear] if plant is None else (f'plant = "{plant.name}"',)
     drives = [columns[renamed[roles["drive"].header]] for columns in written.values()]
     # One device drives all records: steps show that it holds, a chirp cannot.
     held = [float(np.mean(np.diff(drive) == 0.0)) > KEPT for drive in drives]
-    stays = f"keeps its value from row to row in {held.count(True)} of {len(held)} files"
-    kept = ("zero", stays) if any(held) else ("linear", "changes in each row")
+    steps = f"is constant between two rows, as its steps in {held.count(True)} of the {len(held)} files show"
+    kept = ("zero", steps) if any(held) else ("linear", "runs straight between two rows, as it changes in each row")
     lines = [
         "# Written by `armid new campaign --from`: check each line with GUESS. The CSV files are copies with",
         "# headers that armid reads. Numbers are those of the originals unless a line says so, times are in",
-        "# seconds.", "#", *(f"# {note}" for note in notes), f'name = "{name}"', *GUESSED_MODELS[linear],
+        "# seconds.", "#", *(f"# {note}" for note in notes), f'name = "{name}"', *model,
         f'hold = "{kept[0]}"  # GUESS: the drive {kept[1]}',
     ]  # fmt: skip
     wrapped = [new for old, new in renamed.items() for t in tables if wraps_at(t.columns[old], new)]
     lines += [f"unwrap = true  # {wrapped[0]} jumps by whole turns"] if wrapped else []
+    driven = [] if plant is None else [f'{i.name} = "{renamed[roles["drive"].header]}"  # GUESS' for i in plant.inputs]
+    lines += ["[inputs]", driven[0]] if driven else []
     for i, (file, columns) in enumerate(written.items()):
         last = i == len(written) - 1 and len(written) > 1
         lines += ["", "[[records]]", f'file = "{file}"  # {about(columns, renamed)}']

@@ -15,7 +15,7 @@ from armid.problem.problem import Replay, judged_by
 from armid.problem.space import Space
 from armid.report.document import points, record_axes, small_axes
 from armid.report.style import GREY, OKABE_ITO, PALE, entitle, legend_below, panels, pyplot
-from armid.units import scale_of, shown
+from armid.units import labelled, scale_of, shown
 
 MOST_FITS_DRAWN = 8
 MOST_PAIRS = 6
@@ -112,7 +112,7 @@ def convergence_figure(identification: Identification) -> Any:
         axis.yaxis.set_minor_locator(LogLocator(subs=(2.0, 5.0)))
         axis.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
         axis.yaxis.set_minor_formatter(StrMethodFormatter("{x:g}"))
-    named = f"{identification.fitness.name} [{unit}]" if unit else identification.fitness.name
+    named = labelled(identification.fitness.name, unit)
     axis.set(ylabel="similarity degree of the best" if similarity else f"best {named}", xlabel="simulations")
     text = f"{identification.identifier}, seed {identification.seed}, ends at {height[-1]:.6g} {unit}".rstrip()
     axis.set_title(f"{identification.campaign.name}: {text}", fontsize="medium")
@@ -145,7 +145,7 @@ def pair_figure(
     """Draw the 95 % ellipses of the pairs that are correlated most, see `pairs_of`."""
     units = [unit for unit, free in zip(space.units, space.free, strict=True) if free]
     scales = [scale_of(unit, value) for unit, value in zip(units, x, strict=True)]
-    labels = [f"{name} [{unit}]" for name, (unit, _) in zip(space.free_names, scales, strict=True)]
+    labels = [labelled(name, unit) for name, (unit, _) in zip(space.free_names, scales, strict=True)]
     factor, deviation = np.array([factor for _, factor in scales]), np.sqrt(np.diag(covariance))
     with np.errstate(invalid="ignore", divide="ignore"):  # of those that are not known
         correlation = covariance / np.outer(deviation, deviation)
@@ -167,7 +167,7 @@ def pair_figure(
             axis.plot(*(factor * np.atleast_2d(values))[:, pair].T, ls="", **look)
         axis.set(xlabel=labels[pair[0]], ylabel=labels[pair[1]])
         axis.ticklabel_format(useOffset=False)
-        axis.locator_params(nbins=4)
+        axis.locator_params(nbins=3)  # labels of five digits
         axis.set_title(f"correlation {r:+.3f}", fontsize="small")
     legend_below(figure, 4)
     figure.suptitle(f"{campaign}: pairs of parameters", fontsize="medium")

@@ -27,7 +27,7 @@ from armid.report.document import (
 )
 from armid.report.result import Parts
 from armid.report.style import GREY, OKABE_ITO, entitle, legend_below, look, panels
-from armid.units import scale_of, shown
+from armid.units import behind, labelled, scale_of, shown
 
 PACKAGES_OF_IDENTIFIABILITY = ("armid", "numpy", "scipy", "numba")
 UNDETERMINED = "not determined"
@@ -259,12 +259,12 @@ def profile_remark(examination: Examination, profile: Profile) -> str:
         return ""
     if null is not None and not low and profile.low == null == profile.box[0]:
         upper = shown(profile.high, profile.unit)
-        return f"{value} may be null: it is below {upper[0]:.3g} {upper[1]} at 95 %, and 0 is as good."
+        return f"{value} may be null: it is below {upper[0]:.3g}{behind(upper[1])} at 95 %, and 0 is as good."
     if low != high:
         side = "above" if low else "below"
         return f"{value} is not bounded {side}: the 95 % interval runs into the box."
     interval, by = (interval_text(a * factor, b * factor) for a, b in ((profile.low, profile.high), profile.curvature))
-    unit = "" if profile.unit == "1" else f" {shown(0.0, profile.unit)[1]}"
+    unit = behind(shown(0.0, profile.unit)[1])
     return (f"{value}: the profile says {interval}{unit}, the curvature {by}: the records are not symmetric about the "
             "minimum, or a bound holds what would make up for it; believe the profile.")  # fmt: skip
 
@@ -357,8 +357,8 @@ def draw_profile(axis: Any, profile: Profile) -> None:
             axis.axvline(bound * factor, color=GREY, lw=3.0, label="bound of the box")
     axis.plot(profile.estimate * factor, 0.0, color=LIMIT, marker="D", ms=6, ls="none", clip_on=False, zorder=5,
               label="estimate")  # fmt: skip
-    name = f"{profile.name} [{unit}]" if unit != "1" else profile.name
-    axis.set(xlim=(left * factor, right * factor), ylim=(0.0, TOP), xlabel=name, ylabel="rise of chi2")
+    axis.set(xlim=(left * factor, right * factor), ylim=(0.0, TOP))
+    axis.set(xlabel=labelled(profile.name, unit), ylabel="rise of chi2")
     axis.ticklabel_format(axis="x", useOffset=False, style="plain")
     axis.locator_params(axis="x", nbins=4)
 
@@ -433,7 +433,7 @@ def draw_sensitivities(axis: Any, examination: Examination, i: int, jacobian: Ar
         axis.plot(replay.times, curve, lw=1.7, label=name, **look(j))
     axis.axhline(0.0, color=GREY, lw=0.8, zorder=0)
     axis.set_title(f"{replay.name}: sensitivities, each scaled to 1", fontsize="medium")
-    axis.set(xlabel="time [s]", ylabel="scaled, 1", ylim=(-1.08, 1.08))
+    axis.set(xlabel="time [s]", ylabel="scaled", ylim=(-1.08, 1.08))
     axis.margins(x=0.01)
 
 

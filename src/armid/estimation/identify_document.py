@@ -95,7 +95,9 @@ def identify_document(
 
 def answer(result: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, ...]:
     free = {name: p for name, p in result["parameters"].items() if p["bound_low"] is not None}
+    exact = ", ".join(details.get("within_tolerances", ()))
     begins = lead(free, result["error"]["holdout"] is not None)
+    begins += " (constants count as exact)" if exact and any(p["low"] is not None for p in free.values()) else ""
     lost = [name for name, p in free.items() if p["low"] is None and p.get("interval_by") != "bootstrap"]
     found = [name for name in free if name not in lost or len(lost) == len(free)]
     first = f"{begins}: {'; '.join(f'{name} = {value_text(free[name])}' for name in found)}."
@@ -111,7 +113,6 @@ def answer(result: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, 
     doubts = [f"Held by a bound, and not to be trusted: {', '.join(held)}."] if held else []
     doubts += [f"Not determined by these records: {', '.join(lost)}."] if lost else []
     doubts += details["warnings"]
-    exact = ", ".join(details.get("within_tolerances", ()))
     alone = f" The intervals take constants as exact that are known roughly: {exact}." if exact else ""
     if not free:
         return "Nothing was free: the model was judged as it is.", second

@@ -13,7 +13,7 @@ import numpy as np
 from pymoo.core.algorithm import Algorithm
 
 from armid.engine import golden_steps
-from armid.errors import ArmidError, nearest
+from armid.errors import ArmidError, nearest_registered
 from armid.identifiers.evolutionary import EVOLUTIONARY
 from armid.identifiers.identifier import SMALLEST_SHARE, Identifier, Option, checked, options_in
 from armid.identifiers.local import LEAST_SQUARES, NLOPT
@@ -193,7 +193,7 @@ def identifier_of(name: str, known: Mapping[str, Identifier]) -> Identifier:
         if local.startswith(PREFIX):
             raise ArmidError(f"identifier '{local}' is global, {PREFIX} expects a local one")
         return multistart_of(identifier_of(local, known))
-    raise ArmidError(f"identifier '{name}' is not known: {nearest(name, known)}")
+    raise ArmidError(f"identifier '{name}' is not known: {nearest_registered(name, known)}")
 
 
 IDENTIFIERS = Catalogue[Identifier]({i.name: i for i in (PSO, *EVOLUTIONARY, *NLOPT, LEAST_SQUARES, *FOREIGN)})

@@ -22,7 +22,7 @@ from armid.inference.library import Library
 from armid.inference.model import ROUGHLY, Fit
 from armid.inference.whitening import WhitenedData, WhiteRecords
 from armid.model import Array
-from armid.units import shown
+from armid.units import behind, shown
 
 # Parts that are left out in turn; models of each number of effects that are compared.
 PARTS_LEFT_OUT, MOST_OF_SIZE = 5, 3
@@ -52,7 +52,7 @@ class Missed:
                 f"records by {train:.3g}. Measured by noise and by the doubt "
                 f"of the parameters, this is {self.factor:.3g} times as much."]  # fmt: skip
         if self.outside:
-            reach = [f"{name} reaches {shown(value, unit)[0]:.3g} {shown(1.0, unit)[1]} (train: "
+            reach = [f"{name} reaches {shown(value, unit)[0]:.3g}{behind(shown(1.0, unit)[1])} (train: "
                      f"{shown(end, unit)[0]:.3g})" for name, (value, end, unit) in self.outside.items()]  # fmt: skip
             said.append(f"It leaves the range of the train records: {', '.join(reach)}. Effects that show only there "
                         "cannot be found; train on such a record.")  # fmt: skip
@@ -116,17 +116,15 @@ def rms_of(seen: Residuals, place: int) -> float:
 def outside(train: Residuals, holdout: Residuals, inside: slice) -> dict[str, tuple[float, float, str]]:
     """Return the variables of the motion that leave the range of the train records."""
     plant, excursions = train.model.plant, {}
-    units = {s.name: s.unit for s in plant.states} | {i.name: i.unit for i in plant.inputs}
     for name, known in train.variables.items():
         values = holdout.variables[name][inside]
         low, high = float(known.min()), float(known.max())
         least, most = float(values.min()), float(values.max())
         margin = OUTSIDE * max(high - low, 1e-300)
-        unit = units.get(name, plant.scales.effort_unit)
         if most - high > max(margin, low - least):
-            excursions[name] = (most, high, unit)
+            excursions[name] = (most, high, plant.unit_of(name))
         elif low - least > margin:
-            excursions[name] = (least, low, unit)
+            excursions[name] = (least, low, plant.unit_of(name))
     return excursions
 
 

@@ -91,9 +91,18 @@ class Inference:
 
     @property
     def named(self) -> list[Hypotheses]:
-        """The models whose parts all have names, the most probable first; an effect at its null is left out."""
-        models = [m for m, _ in self.exploration.ranked() if not any(h.kind == "unknown" for h in m)]
-        return [m for m in models if not self.exploration.fits[m].has_idle_effect]
+        """The models whose parts all have names, by the probability of the names, whose forms share it; then by own.
+
+        Those with an effect at its null are left out.
+        """
+        fits = self.exploration.fits
+        ranked = [(m, p) for m, p in self.exploration.ranked()
+                  if not (any(h.kind == "unknown" for h in m) or fits[m].has_idle_effect)]  # fmt: skip
+        sums: dict[frozenset[tuple[str, str]], float] = {}
+        for model, p in ranked:
+            names = frozenset(h.public for h in model)
+            sums[names] = float(np.logaddexp(sums.get(names, -np.inf), p))
+        return sorted((m for m, _ in ranked), key=lambda m: -sums[frozenset(h.public for h in m)])
 
     def without(self, denied: Hypotheses, standing: Hypotheses) -> "Inference":
         """Return what is probable where held-out records deny some hypotheses; standing: the model that is left."""
@@ -125,7 +134,7 @@ class Inference:
 
     @property
     def probabilities(self) -> dict[str, Any]:
-        """What is probable: effects, sets, nothing, unknown, records, drifts, and constants in tolerances."""
+        """What is probable: effects, sets, nothing, unknown, records, drifts; and constants, in their tolerances."""
         post = self.posterior
         return {
             "effects": listed(post.of_kind("effect")),

@@ -54,6 +54,7 @@ from armid.loop.result import (
 )
 from armid.model import Array, Effect, Model
 from armid.record import Campaign, Record
+from armid.units import behind
 
 # Mistakes of the data checks that leave nothing to search for, and what it tells whatever the loop finds.
 GROSS = ("sign", "unit", "time", "angle", "exchanged", "input", "position")
@@ -273,9 +274,9 @@ def verdicts_of(
 
 
 def limits_of(judged: Judgement) -> list[str]:
-    """Return which limits hold a parameter: nobody else is accused of what they cause."""
-    held = [e for e in judged.estimates if HELD in e.doubts]
-    return [f"{e.name} sits at its limit {e.value:.4g}{'' if e.unit == '1' else ' ' + e.unit}: widen it (--bounds "
+    """Return which limits hold a parameter: nobody else is accused of what they cause. 0 is an end of physics."""
+    held = [e for e in judged.estimates if HELD in e.doubts and e.value]
+    return [f"{e.name} sits at its limit {e.value:.4g}{behind(e.unit)}: widen it (--bounds "
             f"{e.name}=LOW:HIGH), or fix it." for e in held]  # fmt: skip
 
 

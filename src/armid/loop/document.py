@@ -10,7 +10,7 @@ from armid.errors import ArmidError
 from armid.estimation.identify import versions_of
 from armid.estimation.identify_document import PACKAGES_OF_IDENTIFY
 from armid.inference.candidates import ERROR_OF
-from armid.inference.carry_over import missed_sentences
+from armid.inference.carry_over import missed_sentences, over_noise
 from armid.inference.checks import Finding, Residuals, time_in_words
 from armid.inference.decisions import LISTED, OVER_NOISE, SIGNIFICANCE
 from armid.inference.hypothesis import words
@@ -110,6 +110,8 @@ PROBABILITIES_NOTE = (
     "explain the records instead."
 )
 
+UNNAMED = "the plant has no port for them, a free parameter does the same, or they were left out by name."
+
 
 def loop_document(
     report: Mapping[str, Any], details: Mapping[str, Any], svgs: Mapping[str, str], again: str
@@ -207,7 +209,9 @@ def probability_table(report: Mapping[str, Any]) -> Table:
     rows += [("something that the library does not hold", chances["unknown"], "", ""),
              ("nothing", chances["nothing"], "", "")]  # fmt: skip
     columns = ["what", Column("probability", "probability", ".2f"), "kind", "in its place"]
-    return table("Probabilities", columns, rows, PROBABILITIES_NOTE)
+    named, known = chances["among"]
+    why = f" {known - named} effects are not named: {UNNAMED}" if named < known else ""
+    return table("Probabilities", columns, rows, PROBABILITIES_NOTE + why)
 
 
 def error_sentence(report: Mapping[str, Any]) -> str:
@@ -370,7 +374,7 @@ def models_of(inference: Inference) -> list[dict[str, Any]]:
                 "model": words(model), "probability": probability,
                 "parameters": {n: {"value": values[n], "low": i.low, "high": i.high} for n, i in known.items()},
             }  # fmt: skip
-    return list(entries.values())
+    return sorted(entries.values(), key=lambda entry: -entry["probability"])
 
 
 def conclusion(loop: ClosedLoop) -> str:
@@ -429,7 +433,7 @@ def declared_by(loop: ClosedLoop) -> str:
             continue
         if name in library.fixed_shapes(owner):
             options.append(f"--fix {library.public(name)}={value:.6g}")
-        elif null is not None:
+        elif null not in (None, value):  # at its null a strength has no range
             low, high = sorted((null, null + SEARCHED_TO * (value - null)))
             options.append(f"--bounds {library.public(name)}={low:.3g}:{high:.3g}")
     return f"`armid identify` declares this model with `--effects {' '.join(options)}`."
@@ -469,12 +473,15 @@ def carried_sentence(loop: ClosedLoop) -> str:
     missed = f"{unseen.data.each[worst].file} is missed by {factors[worst]:.3g} times its noise"
     if not np.isfinite(factors[worst]):
         missed = f"{unseen.data.each[worst].file} makes the simulation diverge"
+    alone = ""
+    if sum(over_noise(judged.train, unseen)) == 1:
+        alone = " No other held-out record is missed: this one may itself be faulty, for example late or scaled."
     if loop.withdrawn is None and judged.diagnosis.significant:
         named = f"With {' + '.join(loop.effects)} the declared model" if loop.effects else "The declared model"
-        return f"{named} leaves more than noise on the train records. {missed_sentences(judged.missed)[0]}"
+        return f"{named} leaves more than noise on the train records. {missed_sentences(judged.missed)[0]}{alone}"
     if loop.withdrawn is None:
         return (f"Only noise remains on the train records, but of the held-out records {missed}: something acts there "
-                "that the train records do not show.")  # fmt: skip
+                f"that the train records do not show.{alone}")  # fmt: skip
     last = loop.after.holdout
     assert last is not None
     worse = unseen.errors.joint_nrmse / last.errors.joint_nrmse - 1.0
@@ -524,7 +531,9 @@ def diagnosis_sentences(seen: Residuals) -> list[str]:
     said = [f"What remains is more than noise (chance {'below ' if diagnosis.p < LEAST_CHANCE else ''}"
             f"{max(diagnosis.p, LEAST_CHANCE):.2g})."]  # fmt: skip
     if not diagnosis.noise_known:
-        said.append("No rest tells the noise: the residual is tested against itself.")
+        levels = seen.data.levels
+        of = f" of {sum(not level.known for level in levels)} of {len(levels)} signals" if levels[1:] else ""
+        said.append(f"No rest tells the noise{of}: the residual is tested against itself.")
     wholes = {
         "size": "Its mean square is {ratio:.4g} times that of the noise.",
         "repeats": "Repeats of {where} agree with each other {ratio:.3g} times better than with the model (mean "

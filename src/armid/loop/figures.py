@@ -15,7 +15,7 @@ from armid.model import Array
 from armid.problem.problem import Replay
 from armid.report.document import points, record_axes, small_axes, value_text
 from armid.report.style import COLOURS, GREY, OKABE_ITO, PALE, entitle, legend_below, log_axis, panels, pyplot
-from armid.units import scale_of, shown
+from armid.units import labelled, scale_of, shown
 
 AFTER = OKABE_ITO["blue"]
 LOOKS = (("before", OKABE_ITO["vermilion"]), ("after", AFTER))
@@ -160,7 +160,7 @@ def against_figure(loop: ClosedLoop) -> Any:
     names, places, model = moved(loop), sorted({r.place for r in first.replays}), first.model
     figure, axes = panels(len(names) * len(places), len(names), 5.6, 3.6)
     for axis, (place, name) in zip(axes, product(places, names), strict=True):
-        factor, unit = shown(1.0, unit_of(name, model))
+        factor, unit = shown(1.0, model.plant.unit_of(name))
         height, signal_unit = shown(1.0, model.plant.outputs[place].unit)
         for label, colour, judged in drawn_of(loop):
             x, y = sorted_by(judged.train, name, place)
@@ -168,7 +168,7 @@ def against_figure(loop: ClosedLoop) -> Any:
             means = [np.array([part.mean() for part in np.array_split(values, MOST_BINS)]) for values in (x, y)]
             axis.plot(factor * means[0], height * means[1], color=colour, lw=2.0, label=label)
         axis.axhline(0.0, color=GREY, lw=0.8)
-        axis.set(xlabel=f"{name} [{unit}]", ylabel=f"residual [{signal_unit}]")
+        axis.set(xlabel=labelled(name, unit), ylabel=f"residual [{signal_unit}]")
     legend_below(figure, 2)
     entitle(figure, f"{loop.campaign.name}: residual against speed and position")
     return figure
@@ -223,7 +223,7 @@ def interval_figure(campaign: str, models: Sequence[Mapping[str, Any]], averaged
             axis.errorbar([factor * p["value"]], [i], xerr=ends_of(p, factor), fmt="o", capsize=4,
                           color=AFTER if i == len(models) else GREY)  # fmt: skip
         axis.set_yticks(range(len(labels)), labels, fontsize="small")
-        axis.set(xlabel=f"{name} [{unit}]", ylim=(len(labels) - 0.5, -0.5))
+        axis.set(xlabel=labelled(name, unit), ylim=(len(labels) - 0.5, -0.5))
         axis.ticklabel_format(axis="x", useOffset=False)
         axis.tick_params(axis="x", labelrotation=30, labelsize="small")
     entitle(figure, f"{campaign}: 95 % intervals by model, and over all")
@@ -326,7 +326,7 @@ def share_panel(axis: Any, missing: Missing) -> None:
 def signal_panel(axis: Any, missing: Missing, best: Dependence, variable: str) -> None:
     """Draw the signal of every record against one variable, with the curve where it is the one that was fitted."""
     model, signal = missing.lacking.records.replays[0].model, next(s for s in missing.signals if s.port == best.port)
-    factor, name = shown(1.0, unit_of(variable, model))
+    factor, name = shown(1.0, model.plant.unit_of(variable))
     largest = float(np.max(np.abs(np.concatenate(signal.signals)), initial=0.0))
     unit, scale = scale_of(model.plant.ports[best.port], largest)
     for segment, values in zip(missing.segments, signal.signals, strict=True):
@@ -338,9 +338,4 @@ def signal_panel(axis: Any, missing: Missing, best: Dependence, variable: str) -
         heights = np.linalg.lstsq(hats(seen, best.first, best.last), np.concatenate(signal.signals), rcond=None)[0]
         axis.plot(factor * knots, scale * heights, "-", color="black", label="curve through it")
         axis.legend(fontsize="small")
-    axis.set(xlabel=f"{variable} [{name}]", ylabel=f"missing at {best.port} [{unit}]")
-
-
-def unit_of(variable: str, model: Any) -> str:
-    units = {s.name: s.unit for s in model.plant.states} | {i.name: i.unit for i in model.plant.inputs}
-    return str(units.get(variable, "s" if variable == "time" else model.plant.scales.effort_unit))
+    axis.set(xlabel=labelled(variable, name), ylabel=labelled(f"missing at {best.port}", unit))

@@ -27,7 +27,7 @@ from armid.problem.problem import Replay
 from armid.record import Campaign, Record
 from armid.report.document import curve_entry, plain
 from armid.report.result import LOOP, Kind, Result
-from armid.units import shown
+from armid.units import behind, shown
 
 IMPLAUSIBLE, DISAGREES, CARRIES_NOT, NO_DISCREPANCY, EXPLAINED, PARTLY, UNEXPLAINED, TOO_ALIKE = (
     "implausible_records", "record_disagrees", "does_not_carry_over", "no_discrepancy", "explained",
@@ -376,9 +376,9 @@ def of_output(replay: Replay, candidate: Array) -> JointErrors:
 
 
 def spelled(hypothesis: Hypothesis) -> str:
-    """Return a hypothesis in words, an effect with the word of its form."""
-    form = f":{hypothesis.form}" if hypothesis.kind == "effect" and hypothesis.form else ""
-    return f"{words([hypothesis])}{form}"
+    """Return a hypothesis in words, an effect with the word of its form, an unknown signal with what it follows."""
+    joint = {"effect": ":", "unknown": ", over "}.get(hypothesis.kind, "")
+    return f"{words([hypothesis])}{joint}{hypothesis.form}" if hypothesis.form and joint else words([hypothesis])
 
 
 def log_of(inference: Inference) -> list[dict[str, Any]]:
@@ -452,7 +452,7 @@ def along(value: float, low: float, high: float) -> tuple[float, float]:
 
 def fault_sentence(s: RecordFault) -> str:
     factor, name = shown(1.0, s.unit)
-    unit = "" if name == "1" else f" {name}"
+    unit = behind(name)
     if s.kind in ("gap", "clipped", "stuck", "spikes"):
         words = {"gap": "bridged over a gap", "clipped": "clipped", "stuck": "repeated", "spikes": "spikes"}[s.kind]
         where = f"from {s.from_s:.4g} to {s.to_s:.4g} s"

@@ -334,6 +334,14 @@ class Plant:
         rough = tuple(names)
         return replace(self, rough=rough, ports={**self.ports, **{f"{name}_error": "1" for name in rough}})
 
+    def unit_of(self, variable: str) -> str:
+        """Return the unit of a state, an input, the drive's effort or the voltage; "" for one that is not known."""
+        # of several columns each may bring another unit
+        inputs = {i.name: i.unit for i in self.inputs if len(i.columns) < 2}
+        units = {s.name: s.unit for s in self.states} | inputs | {"time": "s"}
+        named = {"drive_effort": self.scales.effort_unit, "voltage": self.ports.get("winding", "")}
+        return {**named, **units}.get(variable, "")
+
     def for_unit(self, unit: str) -> "Plant":
         """Return the sibling whose recorded signal has the unit.
 

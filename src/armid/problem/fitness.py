@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from armid.errors import ArmidError, nearest
+from armid.errors import ArmidError, nearest, nearest_registered
 from armid.model import Array, Catalogue
 
 SERIES = ("measured", "simulated")
@@ -92,7 +92,7 @@ def fitness_of_name(name: str, known: Mapping[str, Fitness]) -> Fitness:
     """Return the fitness of a name, or of a name and an output: `rmse:hub_angle`."""
     first, _, output = name.partition(":")
     if first not in known:
-        raise ArmidError(f"fitness '{first}' is not known: {nearest(first, known)}")
+        raise ArmidError(f"fitness '{first}' is not known: {nearest_registered(first, known)}")
     return replace(known[first], name=name, output=output) if output else known[first]
 
 

@@ -12,7 +12,7 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from armid.errors import ArmidError, nearest, quoted
+from armid.errors import ArmidError, nearest, nearest_registered, quoted
 from armid.model import ManoeuvreKey
 from armid.record.table import LARGEST_CELL
 
@@ -343,8 +343,8 @@ def validated(sheet: type[SheetT], table: object, where: str, further: Collectio
 
 def unknown_name(what: str, name: str, known: Collection[str], where: str) -> ArmidError:
     """Return the sentence for a name that nobody declared or registered."""
-    own = "; one of your own is a plug-in, FILE.py:NAME" if what == "plant" else ""
-    return ArmidError(f"{where}: {what} {quoted(name)} is unknown, {nearest(name, known)}{own}")
+    hint = nearest_registered if what in ("plant", "effect") else nearest
+    return ArmidError(f"{where}: {what} {quoted(name)} is unknown, {hint(name, known)}")
 
 
 def load_toml(path: Path, named: str = "") -> dict[str, Any]:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Union, overload
 import numpy as np
 
 from armid.report.style import Array, place_labels, pyplot, thinned
-from armid.units import DEG, scale_of, shown
+from armid.units import DEG, behind, scale_of, shown
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -305,7 +305,7 @@ def value_text(entry: Mapping[str, Any], struck: bool = False) -> str:
     name, factor = scale_of(entry["unit"], entry["value"])
     ends = () if entry["low"] is None or entry["high"] is None else (entry["low"], entry["high"])
     digits = digits_of(entry["value"], *ends)
-    text = f"{factor * entry['value']:.{digits}g}{'' if name == '1' else f' {name}'}"
+    text = f"{factor * entry['value']:.{digits}g}{behind(name)}"
     if not ends or not (entry["interval_holds"] or struck):
         return text
     text += f" ({factor * ends[0]:.{digits}g} to {factor * ends[1]:.{digits}g})"

@@ -241,9 +241,9 @@ def refuse_unwritable(folder: Path | None, file: str = "") -> None:
             with NewFiles(folder):
                 left = disk_usage(folder).free
         except OSError as error:
-            if HIDDEN_PREFIX in str(error.filename):
-                error.filename = str(folder / file)
-            raise
+            where = folder / file if HIDDEN_PREFIX in str(error.filename) else error.filename or folder
+            why = f"cannot be used: {error.strerror or error}, a folder that can be written is expected"
+            raise ArmidError(f"{where} {why}") from error
         if left < LEAST_ROOM:
             expected = f"at least {LEAST_ROOM / 1e6:.0f} MB are expected"
             raise ArmidError(f"{folder / file}: {left / 1e6:.1f} MB are left on its disk, {expected}")

@@ -313,7 +313,9 @@ def clean_records(settings: Mapping[str, Any], model: Model) -> tuple[Record, ..
 
 def in_window(record: Record, window: Sequence[float] | str) -> Record:
     """Return the record in a window [s]; the word for the whole record keeps the window of its file."""
-    return record if window == WHOLE_WINDOW else with_window(record, (float(window[0]), float(window[1])), record.file)
+    if window == WHOLE_WINDOW:
+        return record
+    return with_window(record, (float(window[0]), float(window[1])), f"{record.file}, windows_s")
 
 
 def noise_rms(settings: Mapping[str, Any], unit: str) -> float:

@@ -11,7 +11,7 @@ from pandas import DataFrame, concat
 from armid.report.document import Column, Figure, Part, Table, Text, slug, unlike
 from armid.report.style import DASHES, INK, legend_below, line_look, panels, row_names
 from armid.study.analyses.analysis import N_RUNS, PARAMETER, SETTING, VARIANT, Analysis, Evidence, is_swarm
-from armid.units import shown
+from armid.units import labelled, shown
 
 MEAN_ROW = "mean of the rows"
 AVERAGED = ["published_error", "error_of_median", "median_error", "mean_error"]
@@ -93,7 +93,7 @@ def paper_layout(evidence: Evidence, title: str, with_truth: bool) -> Table:
     tables, columns = [], [Column("source", "source"), Column("case", "row")]
     for name in names:
         factor, unit = shown(1.0, units[name])
-        group = name if unit == "1" else f"{name} [{unit}]"
+        group = labelled(name, unit)
         columns += [Column(f"{name}_true", f"{group} true", ".2f" if with_truth else ".4f", factor, group),
                     Column(f"{name}_found", f"{group} found", ".4f", factor, group),
                     Column(f"{name}_error", f"{group} error %", ".3f", 100.0, group)]  # fmt: skip

@@ -11,7 +11,7 @@ from armid.report.document import Column, Figure, Part, Table
 from armid.report.style import legend_below, line_look, mark_handles, marker_of, panels, row_names
 from armid.study.analyses.analysis import N_RUNS, PAPER, PARAMETER, VARIANT, Analysis, Evidence
 from armid.study.analyses.table1 import paper_layout
-from armid.units import shown
+from armid.units import labelled, shown
 
 COLUMNS = (
     Column("setting", "noise, window"), VARIANT, PARAMETER,
@@ -108,7 +108,7 @@ def table2_figure(estimates: DataFrame, published: DataFrame, colours: Mapping[s
             if low - 0.2 * (high - low) <= bound <= high + 0.2 * (high - low):
                 axis.axvline(bound, color="black", ls=":", lw=1.0)
         row_names(axis, i, ["the paper", *(f"{v}\n{s}" for v, s in groups)])
-        axis.set(ylim=(len(groups) + 0.6, -0.6), xlabel=f"{name} [{unit}]")
+        axis.set(ylim=(len(groups) + 0.6, -0.6), xlabel=labelled(name, unit))
         axis.tick_params(axis="y", labelsize=9)
     legend_below(figure, 4, [
         *mark_handles(dict.fromkeys(estimates["case"])),
