@@ -2,7 +2,7 @@
 
 simulate: a population through a manoeuvre, and quantities along a motion. calibrate: how finely time is cut.
 generate, templates/kernel.py.jinja: the module of a model, its equations and the loop that integrates them.
-templates/delays.py.jinja, templates/history.py.jinja: what a module with late signals has besides.
+templates/history.py.jinja: the past of late states.
 transpile: the source of an equation, made self-contained. compile: the module, and what of it is kept on disk.
 simd, simd_math: vectors of candidates in numba, and their elementary functions.
 """

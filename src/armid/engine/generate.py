@@ -32,7 +32,7 @@ FEWEST_IDLE = 8
 # What a node of an effect is where the effect is not used; a guard never crosses 0.
 IDLE = {"term": 0.0, "late": 0.0, "rate": 0.0, "guard": 1.0}
 TEMPLATE = Path(__file__).parent / "templates" / "kernel.py.jinja"
-TEMPLATES = (TEMPLATE, TEMPLATE.with_name("delays.py.jinja"), TEMPLATE.with_name("history.py.jinja"))
+TEMPLATES = (TEMPLATE, TEMPLATE.with_name("history.py.jinja"))
 # Prefixes of lists of names in the template.
 OF_STATES = ("a", "b", "m", "d", "e", "y", "k1", "k2", "k3", "k4", "fa", "fb")
 OF_INPUTS = ("ua", "um", "ub", "us", "uz", "u0", "u1", "ur", "p0", "p1")
@@ -115,7 +115,7 @@ class KernelParts:
         remembered = list(dict.fromkeys(one.of for one in self.late_states))
         numbers = [str(i) for i in range(len(self.delays))]
         of_delays = [listed(numbers, f"{word}_") for word in ("late_by", "whole", "rest", "using")]
-        given = "history, steps_kept, place, per_part, part, edges, numbers, " + "".join(of_delays)
+        given = "delayed, history, steps_kept, place, per_part, part, edges, numbers, " + "".join(of_delays)
         names |= {
             "driven": driven, "late_names": late_states, "remembered": remembered, "late_by": of_delays[0],
             "late_by_names": [f"late_by_{i}" for i in range(len(self.delays))],
