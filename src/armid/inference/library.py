@@ -360,8 +360,8 @@ def calibrated_replays(
     spread = space.complete(rows)
     outputs = [o.name for o in model.plant.outputs]
     allowed, levels = None, iter(noise or ())
-    known: dict[object, Calibration] = {}
-    ready: list[Replay] = []
+    asked: dict[object, tuple[Manoeuvre, Array | None, str]] = {}
+    ready: list[tuple[Record, list[object]]] = []
     for record in records:
         if noise is not None:
             allowed = np.full(len(outputs), np.inf)
@@ -370,13 +370,20 @@ def calibrated_replays(
         record = record.until_window_end()  # noqa: PLW2901
         accuracy = accuracy_against(record.noises, model)
         about = [int(np.log(p.manoeuvre.interval) / np.log(SAME_INTERVAL)) for p in record.pieces]
-        likenesses = [(accuracy, i if on_one else p.manoeuvre.likeness())
-                      for p, i in zip(record.pieces, about, strict=True)]  # fmt: skip
+        likenesses: list[object] = [(accuracy, i if on_one else p.manoeuvre.likeness())
+                                    for p, i in zip(record.pieces, about, strict=True)]  # fmt: skip
         for likeness, piece in zip(likenesses, record.pieces, strict=True):
-            if likeness not in known:
-                known[likeness] = quickly_calibrated(model, piece.manoeuvre, spread, allowed, accuracy)
-        ready += ReadyRecord(record, model, tuple(known[likeness] for likeness in likenesses)).each
-    return tuple(ready)
+            # of several the one whose input jumps most often: steps that are rough at jumps alone are many there
+            if likeness not in asked or piece.manoeuvre.changes > asked[likeness][0].changes:
+                asked[likeness] = (piece.manoeuvre, allowed, accuracy)
+        ready.append((record, likenesses))
+    known = {likeness: quickly_calibrated(model, manoeuvre, spread, most, accuracy)
+             for likeness, (manoeuvre, most, accuracy) in asked.items()}  # fmt: skip
+    return tuple(
+        one
+        for record, likenesses in ready
+        for one in ReadyRecord(record, model, tuple(known[likeness] for likeness in likenesses)).each
+    )
 
 
 def is_finer(replays: Sequence[Replay], others: Sequence[Replay]) -> bool:

@@ -43,6 +43,11 @@ class Manoeuvre:
         """Number of samples before the first at which the inputs are known."""
         return max((len(values) for values in self.before.values()), default=0)
 
+    @property
+    def changes(self) -> float:
+        """Share of the samples at which an input changes."""
+        return float(max((np.mean(np.diff(values) != 0.0) for values in self.inputs.values()), default=0.0))
+
     def times(self) -> Array:
         """Return the sample times [s], shape (n_samples,)."""
         return self.start_time + self.interval * np.arange(self.n_samples, dtype=np.float64)
