@@ -72,12 +72,13 @@ def test_coloured_noise_counts_fewer_samples():
 def test_noise_in_motion_is_found_and_turned_white():
     rng, reading = np.random.default_rng(5), np.linspace(-40.0, 60.0, 20_000)
     grown = np.hypot(0.2, 0.01 * reading) * rng.standard_normal(reading.size)
-    level = growing_level([reading], [grown])
+    level = growing_level([reading], [grown], 0.0)
     assert (level.still, level.growth) == pytest.approx((0.2, 0.01), rel=0.05)
     assert np.std(level.white(grown, [reading.size]) * level.weights(reading)) == pytest.approx(1.0, rel=0.02)
     assert log_density(level, reading, grown) > log_density(white_level(np.std(grown), 0), reading, grown) + 100.0
+    assert growing_level([reading], [grown], 0.5).still == 0.5
     white = rng.standard_normal(20_001)
-    level = alternating_level([white[1:] - 0.9 * white[:-1]])
+    level = alternating_level([white[1:] - 0.9 * white[:-1]], 0.0)
     assert (level.alternation, level.innovation) == pytest.approx((0.9, 1.0), rel=0.02)
     covariance = toeplitz([1.81, -0.9, *np.zeros(38)])
     exact = replace(level, alternation=0.9, innovation=1.0)

@@ -182,12 +182,14 @@ def levels_in_motion(
     each number that it takes costing half a log of the samples (Schwarz 1978, doi:10.1214/aos/1176344136).
     left: of each record, its unit, not whitened.
     """
-    records = [r.record for r in replays]
-    grouped = by_sensor(records, list(zip(levels, [r.measured for r in replays], left, strict=True)))
+    records, plant = [r.record for r in replays], replays[0].model.plant
+    grouped = by_sensor(records, list(zip(levels, replays, left, strict=True)))
     shown = {}
     for sensor, group in grouped.items():
-        known, readings, parts = (list(one) for one in zip(*group, strict=True))
-        options = [(0, known[0]), (2, growing_level(readings, parts)), (2, alternating_level(parts))]
+        known, theirs, parts = (list(one) for one in zip(*group, strict=True))
+        readings = [r.measured for r in theirs]
+        floor = max(hiding_noise(plant, sensor[0], FINE), *(r.record.signals[0].sensor.step / 12**0.5 for r in theirs))
+        options = [(0, known[0]), (2, growing_level(readings, parts, floor)), (2, alternating_level(parts, floor))]
         n = sum(map(len, parts))
         probable = [sum(log_density(level, r, x) for r, x in zip(readings, parts, strict=True)) - 0.5 * k * np.log(n)
                     for k, level in options]  # fmt: skip
@@ -202,33 +204,41 @@ def log_density(level: NoiseModel, readings: Array, residual: Array) -> float:
     return float(np.sum(np.log(weights / level.innovation)) - 0.5 * white @ white)
 
 
-def growing_level(readings: Sequence[Array], parts: Sequence[Array]) -> NoiseModel:
-    """Return the noise that makes residuals most probable where it grows with the reading."""
+def growing_level(readings: Sequence[Array], parts: Sequence[Array], floor: float) -> NoiseModel:
+    """Return the noise that makes residuals most probable where it grows with the reading.
+
+    floor: the least that it is anywhere [unit of the readings].
+    """
     from scipy.optimize import minimize
 
     residual, reading = np.concatenate(parts), np.concatenate(readings)
     sizes = np.sqrt(np.mean(residual**2)) / np.array([1.0, np.sqrt(np.mean(reading**2))])
 
+    def sigma(logs: Array) -> Array:
+        return np.asarray(np.hypot(max(np.exp(logs[0]), floor), np.exp(logs[1]) * reading))
+
     def surprise(logs: Array) -> float:
-        variance = np.sum((np.exp(logs) * np.column_stack([np.ones_like(reading), reading])) ** 2, axis=1)
-        return float(np.sum(np.log(variance) + residual**2 / variance))
+        return float(np.sum(2.0 * np.log(sigma(logs)) + (residual / sigma(logs)) ** 2))
 
-    still, growth = np.exp(minimize(surprise, np.log(sizes), method="Nelder-Mead").x)
-    rms = float(np.sqrt(np.mean(still**2 + (growth * reading) ** 2)))
-    return replace(white_level(rms, 0), growth=float(growth), still=float(still))
+    logs = minimize(surprise, np.log(sizes), method="Nelder-Mead").x
+    still, growth = np.exp(logs)
+    rms = float(np.sqrt(np.mean(sigma(logs) ** 2)))
+    return replace(white_level(rms, 0), growth=float(growth), still=max(float(still), floor))
 
 
-def alternating_level(parts: Sequence[Array]) -> NoiseModel:
-    """Return the noise that makes residuals most probable where neighbouring samples differ in sign."""
+def alternating_level(parts: Sequence[Array], floor: float) -> NoiseModel:
+    """Return the noise that makes residuals most probable where neighbouring samples differ in sign.
+
+    floor: the least that it is, rms [unit of the residuals].
+    """
     from scipy.optimize import minimize_scalar
 
     def size(alternation: float) -> float:
         return float(np.sqrt(np.mean(np.concatenate([without_alternation(x, alternation) for x in parts]) ** 2)))
 
     alternation = float(minimize_scalar(size, bounds=(0.0, 1.0), method="bounded").x)
-    innovation = size(alternation)
-    level = white_level(innovation * float(np.sqrt(1.0 + alternation**2)), 0)
-    return replace(level, innovation=innovation, alternation=alternation)
+    rms = max(size(alternation) * float(np.sqrt(1.0 + alternation**2)), floor)
+    return replace(white_level(rms, 0), innovation=rms / float(np.sqrt(1.0 + alternation**2)), alternation=alternation)
 
 
 def memory_and_sizes(parts: Sequence[Array]) -> tuple[float, list[float]]:
