@@ -5,7 +5,7 @@ import pytest
 
 from armid.errors import ArmidError
 from armid.record import read_campaign
-from armid.record.start import Track, smoothed, state_at
+from armid.record.start import Track, n_still, smoothed, state_at
 from input_texts import LOWERING
 
 TIMES = np.arange(1500) / 500
@@ -28,6 +28,20 @@ def test_a_line_is_smoothed_over_the_longest_window():
     # of degree 1 + 2, the lower of the two degrees: 16/n at the end, 9/4n in the middle, n near 400
     assert end[1] == pytest.approx(0.1 * np.sqrt(16 / 370), rel=0.1)
     assert middle[1] == pytest.approx(0.1 * np.sqrt(9 / 4 / 370), rel=0.1)
+
+
+def test_a_machine_at_rest_starts_at_rest():
+    """While no input changes and the signal stands still its slope is 0; a motion under a still input keeps its own."""
+    rng, rest = np.random.default_rng(6), 60
+    begun = np.concatenate([np.zeros(rest), MOTION[:400]]) + rng.normal(0.0, 0.1, rest + 400)
+    held = [np.append(np.zeros(rest), np.ones(400))]
+    assert n_still(held) == rest
+    assert n_still([]) == 0
+    slope, deviation = smoothed(begun, 0, 0.1, slope=True, still=rest)
+    assert (slope, deviation) == (0.0, pytest.approx(0.1 * np.sqrt(12.0 / rest**3)))
+    assert abs(smoothed(begun, 0, 0.1, still=rest)[0]) < 3.0 * 0.1 / np.sqrt(rest)
+    moving = 3.0 * TIMES[:rest] + rng.normal(0.0, 0.01, rest)
+    assert smoothed(moving, 0, 0.01, slope=True, still=rest)[0] == pytest.approx(3.0 / 500, rel=0.1)
 
 
 def test_the_deviation_is_honest():

@@ -217,7 +217,9 @@ def start_of(record: Record, piece: Piece, plant: Plant, factor: float) -> dict[
         return {}
     given = {n: v for n, v in old.items() if n not in piece.start_deviation}
     tracks = {one.output: Track(one.measured, one.noise.rms) for one in record.signals}
-    return state_shown(plant, given, tracks, piece.manoeuvre.interval, piece.start_index)[0]
+    return state_shown(
+        plant, given, tracks, piece.manoeuvre.interval, piece.start_index, list(piece.manoeuvre.inputs.values())
+    )[0]
 
 
 def moved(record: Record, seconds: float) -> Record:

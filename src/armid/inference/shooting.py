@@ -92,7 +92,8 @@ def cut(record: Record, n_parts: int, plant: Plant, first_part: int, every: int)
         first, length = piece.start_index + piece.window.start, piece.window.stop - piece.window.start
         edges = [first + length * i // n_parts for i in range(n_parts + 1)]
         for a, b in list(pairwise(edges))[first_part::every]:
-            state, deviations = state_shown(plant, given, tracks, whole.interval, a)
+            inputs = [u[a:] for u in whole.inputs.values()]
+            state, deviations = state_shown(plant, given, tracks, whole.interval, a, inputs)
             pieces.append(Piece(whole.part(a, b - a, state), slice(0, b - a), a, deviations, shown_start=state))
     return replace(record, pieces=tuple(pieces), whole_pieces=tuple(pieces))
 

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 MOST_RECORDS_NAMED = 8
 # What [tolerances] of a file says of every constant that it does not name.
 DEFAULT_TOLERANCE = "default"
-# From this tolerance on a value is one to be found rather than one that is known.
-ROUGH = 0.1
+# From this tolerance on, where 0 is within four deviations, a value is one to be found rather than one that is known.
+ROUGH = 0.25
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -46,7 +46,7 @@ class Campaign(Shown):
     holds; an axis has its scales set from the train records. unmeasured: its other outputs. effects: names of those
     declared beforehand. parameters: qualified name -> Override. constants: those of the campaign, SI; each record's
     manoeuvre holds all that apply to it. gyro_range: [rad/s], None when not given. tolerances: constant -> relative
-    standard deviation. rough: those of a tenth or more, with parameters of the plant that are fixed.
+    standard deviation. rough: those of a quarter or more, with parameters of the plant that are fixed.
     chances: effect -> its probability before the records. known: parameter of the plant -> what is known of it before.
     taken_as_exact: constants for which neither the plant nor the campaign says how well they are known. angle: deg, rad
     or rpm, in which results show angles and turning speeds. truth: true values of parameters, for figures alone.

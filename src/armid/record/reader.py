@@ -132,7 +132,8 @@ def started(record: Record, plant: Plant, tracks: Mapping[str, Track], where: st
         elif fitted:
             cut = slice(start, start + spent) if spent else slice(None)
             near = {name: replace(t, values=t.values[cut]) for name, t in tracks.items()}
-            state = state_shown(plant, manoeuvre.constants, near, manoeuvre.interval, 0 if spent else start)
+            inputs = [u[start:] for u in manoeuvre.inputs.values()]
+            state = state_shown(plant, manoeuvre.constants, near, manoeuvre.interval, 0 if spent else start, inputs)
         else:
             state = ({}, {})
         part, shown = manoeuvre.part(start, length, state[0]), state[0] if fitted and trained else {}

@@ -1,6 +1,6 @@
 """From which state a record or a piece of it is simulated: what its outputs show at its first sample, smoothed."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -9,6 +9,7 @@ import numpy as np
 
 from armid.model import Array, Model, Plant
 from armid.record.record import Signal
+from armid.record.sensor import lengths_of_rest
 
 State = tuple[dict[str, float], dict[str, float]]
 # Of a record that is held out, the start comes from this share of its first samples, at most so long [s], at least so
@@ -49,25 +50,28 @@ def n_spent(n_samples: int, interval: float) -> int:
 
 
 def state_shown(
-    plant: Plant, given: Mapping[str, float], tracks: Mapping[str, Track], interval: float, index: int
-) -> State:
+    plant: Plant, given: Mapping[str, float], tracks: Mapping[str, Track], interval: float, index: int,
+    inputs: Sequence[Array],
+) -> State:  # fmt: skip
     """Return the start constants that are not given, and their standard deviations, SI, as the outputs show them.
 
     The outputs are functions h of the states x. At the start their values are h(x), and they change by dh/dx f(x). The
     rates f depend there on states and constants alone (the rate of a position is a speed). Values and slopes of the
     smoothed outputs, each weighed by its deviation, are met by least squares. What no output shows keeps its default,
-    with the plant's own size for its deviation.
+    with the plant's own size for its deviation. inputs: from this sample on, which tell how long the machine may stand
+    still.
     """
     outputs = VisibleOutputs(plant, given)
     names = [c for c in plant.start_constants.values() if c not in given]
     units = {c.name: c.unit for c in plant.constants}
     sizes = np.array([plant.scales.effort if units[n] in ("N", "N m") else plant.scales.speed for n in names])
     values, rates = [], []
+    still = n_still(inputs)
     for output in (o for o in plant.outputs if o.name in tracks):
         track, floor = tracks[output.name], 1e-9 * plant.scales.speed
-        value, deviation = smoothed(track.values, index, track.noise)
+        value, deviation = smoothed(track.values, index, track.noise, still=still)
         values.append((value, max(deviation, track.step / np.sqrt(12.0), floor), output.signal))
-        slope, deviation = smoothed(track.values, index, track.noise, slope=True)
+        slope, deviation = smoothed(track.values, index, track.noise, slope=True, still=still)
         rates.append((slope / interval, max(deviation / interval, floor), output.signal))
     shown = [(v, d, key, outputs.value) for v, d, key in values if outputs.shows(key)]
     shown += [(v, d, key, outputs.rate) for v, d, key in rates if outputs.shows_rate(key)]
@@ -86,6 +90,14 @@ def state_shown(
     covariance = np.linalg.inv(slopes.T @ slopes + np.eye(len(names)))
     deviations = sizes * np.sqrt(np.diag(covariance))
     return dict(zip(names, map(float, start), strict=True)), dict(zip(names, map(float, deviations), strict=True))
+
+
+def n_still(inputs: Sequence[Array]) -> int:
+    """Return during how many first samples no input changes, or changes by no more than its noise."""
+    if not inputs:
+        return 0
+    changed = np.flatnonzero(np.any([u != u[0] for u in inputs], axis=0))
+    return max(int(changed[0]) if changed.size else len(inputs[0]), *lengths_of_rest(inputs), 0)
 
 
 class VisibleOutputs:
@@ -132,7 +144,7 @@ BY_CHANCE = 3.0
 WINDOW_GROWTH, LONGEST_WINDOW = 1.25, 400
 
 
-def smoothed(values: Array, index: int, noise: float, slope: bool = False) -> tuple[float, float]:
+def smoothed(values: Array, index: int, noise: float, slope: bool = False, still: int = 0) -> tuple[float, float]:
     """Return the value of a signal at one sample and its standard deviation, or its change from sample to sample.
 
     A polynomial of degree 1 or 2 is fitted to windows of 5 to 400 samples around the sample (one-sided at the ends of a
@@ -141,12 +153,18 @@ def smoothed(values: Array, index: int, noise: float, slope: bool = False) -> tu
     are tried all the same. The value is that of the polynomial with these two degrees more, so that its bias is small
     against its deviation. The window of the smallest deviation wins; a signal without noise is not smoothed. Source of
     the higher degree: Calonico, Cattaneo, Titiunik 2014, doi:10.3982/ECTA11757.
+    still: samples from there on during which inputs stand still. Where the signal does so too, its change is 0, as well
+    as they can tell: that of a straight line through n of them is 0 to the root of 12/n^3 of the noise.
     """
     best = float(values[index]), noise
     if slope:
         low, n = window_at(index, FEWEST_OF_START, values.size), min(FEWEST_OF_START, values.size)
         row = polynomials(n, n - 1, slope)[index - low] @ polynomials(n, n - 1).T
         best = float(row @ values[low : low + n]), noise * float(np.sqrt(row @ row))
+    rest = values[index : index + still]
+    if rest.size >= FEWEST_OF_START and fitted(rest, 0, 0, noise, slope) is not None:
+        at_rest = (0.0, noise * np.sqrt(12.0 / rest.size**3)) if slope else (np.mean(rest), noise / np.sqrt(rest.size))
+        best = min(best, (float(at_rest[0]), float(at_rest[1])), key=lambda pair: pair[1])
     for degree in DEGREES:
         n = degree + HIGHER + 2
         while n <= min(values.size, LONGEST_WINDOW):
