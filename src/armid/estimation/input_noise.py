@@ -125,13 +125,15 @@ def at_rest(record: Record, piece: Piece, values: Array) -> Mask:
 def pooled_noise(records: Sequence[Record]) -> dict[str, InputNoise]:
     """Return the noise of each measured input: the median over the records that show it, and their smallest step.
 
-    A motion that passes few values shows multiples of the step.
+    Where more than half show none it has none. A motion that passes few values shows multiples of the step.
     """
     seen: dict[str, list[InputNoise]] = {}
     for record in records:
         for name, noise in record.input_noise.items():
             seen.setdefault(name, []).append(noise)
-    rms = {name: float(np.median([n.rms for n in noises])) for name, noises in seen.items()}
+    known = {name: [n.rms for n in noises if n.rms > 0.0] for name, noises in seen.items()}
+    rms = {name: float(np.median(known[name])) if 2 * len(known[name]) >= len(noises) and known[name] else 0.0
+           for name, noises in seen.items()}  # fmt: skip
     steps = {name: min((n.step for n in noises if n.step), default=0.0) for name, noises in seen.items()}
     return {name: InputNoise(rms[name], steps[name]) for name in seen}
 

@@ -302,7 +302,7 @@ def infer(library: Library, declared: Fit) -> Inference:
     inference = inferred(library, declared)
     shown = with_noise_in_motion(library, inference)
     if shown is not library:
-        library, declared = shown, declared_again(shown, declared)
+        library, declared = with_input_noise(shown, declared_again(shown, declared))
         inference = inferred(library, declared)
     if not pooled_noise(library.data.records):
         return inference
@@ -413,19 +413,27 @@ def with_noise_in_motion(library: Library, inference: Inference) -> Library:
     """Return the library with the noise that the model in force shows, itself where nothing asks for it.
 
     Where something unknown is in the records, noise that no rest tells may be all of it: where the records are more
-    probable with such noise than with an unknown signal, and no test finds more.
+    probable with such noise than with an unknown signal, and no test finds more. Noise that alternates imitates nothing
+    that a model may lack: it is looked for wherever no rest tells the noise, and tests may find what else is missing.
     """
     fit, best = inference.exploration.fits[inference.in_force], inference.best
-    if inference.posterior.probability("unknown") < MENTIONED or library.data.inputs_count:
+    is_unknown, read = inference.posterior.probability("unknown") >= MENTIONED, library.as_read or library.data
+    if not is_unknown and read.known:
         return library
     seen = train_residuals(fit)
-    data = library.data.with_levels(levels_in_motion(library.data.levels, seen.replays, seen.raw))
-    problem = replace(fit.records, data=data)
+    levels = levels_in_motion(read.levels, seen.replays, seen.raw)
+    alternates = any(level.alternation for level in levels)
+    if levels == read.levels or not (is_unknown or alternates):
+        return library
+    noisy = library.with_data(read.with_levels(levels))
+    noisy = with_measured_inputs(noisy, fit) if library.as_read else noisy
+    problem = replace(fit.records, data=noisy.data)
     shown = Fit(fit.active, problem, fit.z, problem.plain.residuals(fit.z)[0])
-    if is_significant(shown) or shown.log_density <= best.log_density - 0.5 * best.records.data.log_cover:
+    is_all = alternates or not is_significant(shown)
+    if not is_all or shown.log_density <= best.log_density - 0.5 * best.records.data.log_cover:
         return library
     library.say("the noise in motion is another than at rest: the records are more probable so")
-    return library.with_data(data)
+    return noisy
 
 
 def with_input_noise(library: Library, declared: Fit) -> tuple[Library, Fit]:
