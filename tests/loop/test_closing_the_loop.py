@@ -263,14 +263,17 @@ def test_a_constant_that_is_known_roughly_is_looked_for_as_an_effect_is(axis):
 
 
 def test_what_the_records_cannot_show_widens_an_interval_as_far_as_it_is_probable(axis):
-    """Force, mass and friction that grow alike leave the motion as it is."""
+    """Force, mass and friction that grow alike leave the motion as it is.
+
+    A fit with all three may end anywhere along that valley, so that a rare effect may widen one side more.
+    """
     campaign = axis()
     candidates = {n: EFFECTS[n] for n in ("viscous", "drive_gain")}
     alone, plain, likely = (
         close_loop(Model(campaign.plant), campaign, some, priors=priors).after.estimates[0]
         for some, priors in (({"viscous": EFFECTS["viscous"]}, {}), (candidates, {}), (candidates, {"drive_gain": 0.5}))
     )
-    assert alone.high - alone.low < plain.high - plain.low < 0.25 * (likely.high - likely.low)
+    assert alone.high - alone.low < plain.high - plain.low < 0.75 * (likely.high - likely.low)
     assert likely.low < 2.0 < likely.high
     assert (alone.trusted, likely.trusted) == (True, False)
 
