@@ -413,8 +413,8 @@ def with_noise_in_motion(library: Library, inference: Inference) -> Library:
     """Return the library with the noise that the model in force shows, itself where nothing asks for it.
 
     Where something unknown is in the records, noise that no rest tells may be all of it: where the records are more
-    probable with such noise than with an unknown signal, and no test finds more. Noise that alternates imitates nothing
-    that a model may lack: it is looked for wherever no rest tells the noise, and tests may find what else is missing.
+    probable with such noise than with an unknown signal, and no test finds more. Where a model may be right, and no rest
+    tells the noise, that which alternates is looked for too: it looks larger than it is, and hides what is missing.
     """
     fit, best = inference.exploration.fits[inference.in_force], inference.best
     is_unknown, read = inference.posterior.probability("unknown") >= MENTIONED, library.as_read or library.data
@@ -422,15 +422,14 @@ def with_noise_in_motion(library: Library, inference: Inference) -> Library:
         return library
     seen = train_residuals(fit)
     levels = levels_in_motion(read.levels, seen.replays, seen.raw)
-    alternates = any(level.alternation for level in levels)
-    if levels == read.levels or not (is_unknown or alternates):
+    if levels == read.levels or not (is_unknown or any(level.alternation for level in levels)):
         return library
     noisy = library.with_data(read.with_levels(levels))
     noisy = with_measured_inputs(noisy, fit) if library.as_read else noisy
     problem = replace(fit.records, data=noisy.data)
     shown = Fit(fit.active, problem, fit.z, problem.plain.residuals(fit.z)[0])
-    is_all = alternates or not is_significant(shown)
-    if not is_all or shown.log_density <= best.log_density - 0.5 * best.records.data.log_cover:
+    has_more = is_unknown and is_significant(shown)
+    if has_more or shown.log_density <= best.log_density - 0.5 * best.records.data.log_cover:
         return library
     library.say("the noise in motion is another than at rest: the records are more probable so")
     return noisy
