@@ -413,7 +413,7 @@ def with_noise_in_motion(library: Library, inference: Inference) -> Library:
     """Return the library with the noise that the model in force shows, itself where nothing asks for it.
 
     Where something unknown is in the records, noise that no rest tells may be all of it: where the records are more
-    probable with such noise than with an unknown signal, and no test finds more. Where a model may be right, and no rest
+    probable with such noise than with an unknown signal, and no test finds more. Where a model may be right and no rest
     tells the noise, that which alternates is looked for too: it looks larger than it is, and hides what is missing.
     """
     fit, best = inference.exploration.fits[inference.in_force], inference.best
