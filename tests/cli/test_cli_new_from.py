@@ -171,11 +171,37 @@ def test_an_unknown_unit_and_a_time_that_falls_are_refused(refused, tmp_path):
 
 def test_the_plant_of_a_plug_in_is_the_one_of_the_campaign(run, refused):
     times, drive, speed, _ = wheel(5)
-    write(Path("a.csv"), "t_s,motor_V,speed_rad_s", times, drive, speed)
+    write(Path("a.csv"), "t_s,motor_V,speed_km_h,speed_rad_s", times, drive, 3.6 * speed, speed)
     plugin = f"{Path(__file__).parents[1] / 'winch.py'}:winch"
     made = run("new", "campaign", "mine", "--from", "a.csv", "--plugin", plugin)
     assert made.out == f"wrote mine; try: armid check mine --plugin {plugin}\n"
     toml = tomllib.loads(Path("mine/campaign.toml").read_text())
-    assert (toml["plant"], toml["inputs"]) == ("winch", {"volts": "drive_V"})
+    assert (toml["plant"], toml["inputs"]) == ("winch", {"volts": "volts_V"})
     assert run("check", "mine", "--plugin", plugin).code == 0
     assert "a campaign that is made by --from is expected" in refused("new", "effect", "x", "--plugin", plugin)
+
+
+SLIDE = """
+from armid import Input, Output, Parameter, Plant, Scales, State
+
+slide = Plant(
+    name="slide", parameters=(Parameter("mass", "kg", 1.0, 9.0), Parameter("gain", "N/V", 1.0, 9.0)),
+    states=(State("x", "m", lambda v: v, lambda: 0.0),
+            State("v", "m/s", lambda volts, gain, mass: gain * volts / mass, lambda: 0.0)),
+    inputs=(Input("volts", "V"),), outputs=(Output("slide", "x", "m"),), aliases={"omega": "v", "theta": "x"},
+    scales=Scales(effort=1.0, speed=1.0),
+)
+"""
+
+
+def test_a_position_of_a_linear_axis_is_what_the_plant_of_a_plug_in_reads(run, refused):
+    times, drive, _, angle = wheel(5)
+    write(Path("a.csv"), "t_s,motor [mV],slide_mm", times, drive, angle)
+    Path("slide.py").write_text(SLIDE)
+    assert "no plant for" in refused("new", "campaign", "none", "--from", "a.csv")
+    assert run("new", "campaign", "mine", "--from", "a.csv", "--plugin", "slide.py:slide").code == 0
+    assert tomllib.loads(Path("mine/campaign.toml").read_text())["inputs"] == {"volts": "volts_V"}
+    assert Path("mine/a.csv").read_text().startswith("time_s,slide_mm,volts_V")
+    assert run("check", "mine", "--plugin", "slide.py:slide").code == 0
+    write(Path("b.csv"), "t_s,motor_V,turn_deg", times, drive, angle)
+    assert "slide_m" in refused("new", "campaign", "other", "--from", "b.csv", "--plugin", "slide.py:slide")

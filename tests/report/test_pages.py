@@ -4,6 +4,7 @@ import json
 import re
 from html.parser import HTMLParser
 from io import StringIO
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from stored import EVIL, SVG, loop_details, loop_report, study_document, write_l
 from armid.cli.main import main
 from armid.cli.report import LOOP, document_of, kind_in
 from armid.errors import ArmidError
-from armid.loop.document import chances_sentence, loop_document
+from armid.loop.document import chances_sentence, constant_sentences, loop_document
 from armid.report.document import Document, Line, Listing, Section, Sentences, rmse_text, table, value_text, varying
 from armid.report.files import csv, latex, markdown
 from armid.report.html import html, inline
@@ -72,6 +73,17 @@ def test_a_closed_loop_says_what_the_issue_asks_for(tmp_path):
     assert page.tags.count("input") == 1
     ids = [value for name, value in page.attributes if name == "id"]
     assert len(ids) == len(set(ids)) > 5
+
+
+def test_a_constant_far_from_its_declared_value_is_reported():
+    fit = SimpleNamespace(deviations={"length": -4.02, "load_mass": 1.9})
+    assert constant_sentences(fit) == ["length is 4.0 deviations from its declared value."]
+
+
+def test_a_drift_is_called_a_drift():
+    report = loop_report()
+    report["probabilities"]["drifts"] = {"mass": 0.38, "constant:force_constant": 0.4}
+    assert "; drift of mass 0.38; drift of force_constant 0.40; nothing" in chances_sentence(report)
 
 
 def test_terminal_markdown_and_page_give_the_same_answer_first(tmp_path, capsys):

@@ -25,7 +25,7 @@ from armid.model.effect import RESERVED_WORDS
 from armid.model.parameter import check_name
 from armid.record.sensor import FEWEST_REST_SAMPLES, sensor_of, stands_still
 from armid.record.signal import wraps_at
-from armid.record.table import CsvTable, read_table
+from armid.record.table import CsvTable, missing, read_table
 from armid.registry import load_registry
 from armid.report.result import NewFiles
 from armid.units import SUFFIXES, UNIT_ENDS
@@ -291,29 +291,74 @@ def guessed_campaign(
         if file in names[:i]:
             raise ArmidError(f"{quoted(file)} is there twice: files of different names are expected")
     tables = [read_table(file, file.name) for file in files]
-    roles = roles_of(tables[0])
-    linear = any(roles[q].end in LINEAR for q in roles if q != "time")
-    if linear and "speed" not in roles:
-        raise ArmidError(f"{tables[0].where}: a position of a linear axis is there and no speed, which armid has no "
-                         "plant for: a speed, or a plant of your own by `armid new plant`, is expected")  # fmt: skip
-    turns = [quoted(roles[q].header) for q in ("speed", "position") if q in roles and roles[q].end in TURNING_ENDS]
-    if linear and turns:
-        straight = next(quoted(c.header) for c in roles.values() if c.end in LINEAR)
-        raise ArmidError(f"{tables[0].where}: {straight} tells of a machine that moves straight and {turns[0]} of one "
-                         "that turns, which armid has no plant for: a plant of your own by `armid new plant` is "
-                         "expected")  # fmt: skip
-    for quantity, column in roles.items():
-        check_unit(quantity, column, linear, f"{tables[0].where}: the unit of {quoted(column.header)}")
     notes: list[str] = []
-    renamed = {roles[quantity].header: header for quantity, header in new_headers(roles, linear, notes).items()}
+    if plant is None:
+        roles = roles_of(tables[0])
+        linear = moves_straight(roles, tables[0])
+        headers, inputs, named = new_headers(roles, linear, notes), ["drive"], list[str]()
+    else:
+        roles, headers = roles_in(tables[0], plant, notes)
+        inputs = [i.name for i in plant.inputs if i.name in roles]
+        named = [f'{i} = "{headers[i]}"' for i in inputs]
+    model = GUESSED_MODELS[linear] if plant is None else (f'plant = "{plant.name}"',)
+    renamed = {roles[quantity].header: header for quantity, header in headers.items()}
+    drives = {headers[i]: roles[i].factor for i in inputs}
     second = seconds_of(roles["time"], tables[0], notes)
-    drive = renamed[roles["drive"].header], roles["drive"].factor
-    written = {table.file: rewritten(table, renamed, roles["time"].header, second, drive) for table in tables}
+    written = {table.file: rewritten(table, renamed, roles["time"].header, second, drives) for table in tables}
     unused = [header for header in tables[0].columns if header not in (roles["time"].header, *renamed)]
     notes += [f"not used: {', '.join(map(quoted, unused))}"] if unused else []
     if any(column_of(h).end in COUNT_ENDS for h in unused):
         notes.append("counts of an encoder are an angle as angle_counts, with counts_per_turn in this file")
-    return guessed_text(name, tables, roles, written, renamed, linear, notes, plant), written
+    return guessed_text(name, tables, written, renamed, [*drives], notes, model, named), written
+
+
+def moves_straight(roles: Mapping[str, Column], table: CsvTable) -> bool:
+    """Return whether a machine is a linear axis; refuse one that no plant of armid is, and units that are not known."""
+    linear = any(roles[q].end in LINEAR for q in roles if q != "time")
+    if linear and "speed" not in roles:
+        raise ArmidError(f"{table.where}: a position of a linear axis is there and no speed, which armid has no "
+                         "plant for: a speed, or a plant of your own by `armid new plant`, is expected")  # fmt: skip
+    turns = [quoted(roles[q].header) for q in ("speed", "position") if q in roles and roles[q].end in TURNING_ENDS]
+    if linear and turns:
+        straight = next(quoted(c.header) for c in roles.values() if c.end in LINEAR)
+        raise ArmidError(f"{table.where}: {straight} tells of a machine that moves straight and {turns[0]} of one "
+                         "that turns, which armid has no plant for: a plant of your own by `armid new plant` is "
+                         "expected")  # fmt: skip
+    for quantity, column in roles.items():
+        check_unit(quantity, column, linear, f"{table.where}: the unit of {quoted(column.header)}")
+    return linear
+
+
+def roles_in(table: CsvTable, plant: Plant, notes: list[str]) -> tuple[dict[str, Column], dict[str, str]]:
+    """Return output or input of a known plant -> column, and -> header in a record; the time is a column as well.
+
+    The plant reads a column by its name, else it is the first in the unit. That of an input may have no unit.
+    """
+    outputs = {o.name: (tuple(o.factors), tuple(SUFFIXES[o.unit])) for o in plant.outputs}
+    ports = outputs | {i.name: ((*i.columns, i.name), (UNIT_ENDS.get(i.unit, ""),)) for i in plant.inputs}
+    columns = [column_of(header) for header in table.columns]
+    by_name = {header for read, _ in ports.values() for header in read}
+    roles, headers = dict[str, Column](), dict[str, str]()
+    for name, (read, ends) in ports.items():
+        spare = [c for c in columns if c not in roles.values() and c.header not in by_name and not c.unit]
+        fit = [c for c in spare if c.end and c.end in ends and c.end not in COUNT_ENDS]
+        if name in outputs:  # a record has numbers of an output in the unit of a header that is read
+            fit = [c for c in fit if c.factor == 1.0 and any(header.endswith(f"_{c.end}") for header in read)]
+        else:
+            fit += [c for c in spare if not c.end and quantity_of(c) == "drive"]
+        for column in [*(c for c in columns if c.header in read), *fit][:1]:
+            alike = [header for header in read if column.end and header.endswith(f"_{column.end}")]
+            new = column.header if column.header in read else [*alike, "_".join(filter(None, (name, column.end)))][0]
+            times = "" if column.factor == 1.0 else f", its numbers times {column.factor:g}"
+            guess = "" if column.header in read else f"; GUESS: it is {name}"
+            notes.append(f"{new}: the column {quoted(column.header)}{times}{guess}")
+            roles[name], headers[name] = column, new
+    if not outputs.keys() & roles.keys():
+        raise missing(table, "output", [header for read, _ in outputs.values() for header in read])
+    for wanted in plant.inputs:
+        if wanted.required and wanted.name not in roles:
+            raise missing(table, f"column for input '{wanted.name}'", ports[wanted.name][0])
+    return {"time": time_of(table, columns, roles), **roles}, headers
 
 
 def check_unit(quantity: str, column: Column, linear: bool, where: str) -> None:
@@ -336,13 +381,7 @@ def roles_of(table: CsvTable) -> dict[str, Column]:
     driven = [c for c in columns if c.end in DRIVES and c not in roles.values()]
     if "drive" not in roles and driven:
         roles["drive"] = driven[0]
-    if "time" not in roles:
-        unknown = [c for c in columns if c not in roles.values()]
-        rising = [c for c in unknown if np.all(np.diff(table.columns[c.header]) > 0.0)]
-        if not rising:
-            raise ArmidError(f"{table.where}: no column of {quoted(list(table.columns))} rises as a time does, a time "
-                             "in each row is expected")  # fmt: skip
-        roles["time"] = rising[0]
+    roles["time"] = time_of(table, columns, roles)
     if not {"speed", "position"} & roles.keys() or "drive" not in roles:
         motion = "a speed or an angle (angular_velocity_rad_s, angle_deg)"
         what = "an input (drive_V, current_A)" if "drive" not in roles else motion
@@ -356,6 +395,17 @@ def roles_of(table: CsvTable) -> dict[str, Column]:
                              "make a turn is not known: an angle or a speed in deg, rad or turns is expected, or a "
                              "campaign.toml of your own with counts_per_turn")  # fmt: skip
     return roles
+
+
+def time_of(table: CsvTable, columns: Sequence[Column], roles: Mapping[str, Column]) -> Column:
+    """Return the column of the time: by its name, else the first that rises."""
+    unknown = [c for c in columns if c not in roles.values()]
+    named = [c for c in columns if quantity_of(c) == "time"]
+    rising = [c for c in unknown if np.all(np.diff(table.columns[c.header]) > 0.0)]
+    if not named and not rising:
+        raise ArmidError(f"{table.where}: no column of {quoted(list(table.columns))} rises as a time does, a time "
+                         "in each row is expected")  # fmt: skip
+    return [*named, *rising][0]
 
 
 def new_headers(roles: Mapping[str, Column], linear: bool, notes: list[str]) -> dict[str, str]:
@@ -391,34 +441,32 @@ def seconds_of(column: Column, table: CsvTable, notes: list[str]) -> float:
 
 
 def rewritten(
-    table: CsvTable, renamed: Mapping[str, str], time: str, second: float, drive: tuple[str, float]
+    table: CsvTable, renamed: Mapping[str, str], time: str, second: float, drives: Mapping[str, float]
 ) -> dict[str, Array]:
     """Return the columns of a file under the headers of a record; numbers are kept where the unit is.
 
-    drive: its header, and what its numbers are multiplied by.
+    drives: header of an input -> what its numbers are multiplied by.
     """
     for header in (time, *renamed):
         if header not in table.headers:
             raise ArmidError(f"{table.where}: no column {quoted(header)} is there, as in the first file: files of one "
                              "machine with the same columns are expected")  # fmt: skip
-        table.numbers(header, gaps=header != time and renamed.get(header) != drive[0])
+        table.numbers(header, gaps=header != time and renamed.get(header) not in drives)
     times = table.columns[time] if second == 1.0 else np.round(table.columns[time] * second, 12)
     taken = {"time_s", *renamed.values()}
     # an encoder that is not used must not be taken for an output, which wants the counts of a turn
     kept = {h: f"unused_{h}" if column_of(h).end in COUNT_ENDS else h for h in table.columns
             if h not in (time, *renamed) and h not in taken and "," not in h}  # fmt: skip
-    own = {new: table.columns[h] * (drive[1] if new == drive[0] else 1.0) for h, new in renamed.items()}
+    own = {new: table.columns[h] * drives.get(new, 1.0) for h, new in renamed.items()}
     return {"time_s": times} | own | {new: table.columns[h] for h, new in kept.items()}
 
 
 def guessed_text(
-    name: str, tables: Sequence[CsvTable], roles: Mapping[str, Column], written: Mapping[str, Mapping[str, Array]],
-    renamed: Mapping[str, str], linear: bool, notes: Sequence[str], plant: Plant | None,
+    name: str, tables: Sequence[CsvTable], written: Mapping[str, Mapping[str, Array]], renamed: Mapping[str, str],
+    drives: Sequence[str], notes: Sequence[str], model: Sequence[str], named: Sequence[str],
 ) -> str:  # fmt: skip
-    model = GUESSED_MODELS[linear] if plant is None else (f'plant = "{plant.name}"',)
-    drives = [columns[renamed[roles["drive"].header]] for columns in written.values()]
     # One device drives all records: steps show that it holds, a chirp cannot.
-    held = [float(np.mean(np.diff(drive) == 0.0)) > KEPT for drive in drives]
+    held = [any(np.mean(np.diff(columns[drive]) == 0.0) > KEPT for drive in drives) for columns in written.values()]
     steps = f"is constant between two rows, as its steps in {held.count(True)} of the {len(held)} files show"
     kept = ("zero", steps) if any(held) else ("linear", "runs straight between two rows, as it changes in each row")
     lines = [
@@ -429,19 +477,18 @@ def guessed_text(
     ]  # fmt: skip
     wrapped = [new for old, new in renamed.items() for t in tables if wraps_at(t.columns[old], new)]
     lines += [f"unwrap = true  # {wrapped[0]} jumps by whole turns"] if wrapped else []
-    driven = [] if plant is None else [f'{i.name} = "{renamed[roles["drive"].header]}"  # GUESS' for i in plant.inputs]
-    lines += ["[inputs]", driven[0]] if driven else []
+    lines += ["[inputs]", *named] if named else []
+    measured = next(header for header in renamed.values() if header not in drives)
     for i, (file, columns) in enumerate(written.items()):
         last = i == len(written) - 1 and len(written) > 1
-        lines += ["", "[[records]]", f'file = "{file}"  # {about(columns, renamed)}']
+        lines += ["", "[[records]]", f'file = "{file}"  # {about(columns, measured)}']
         lines += [f'role = "{"holdout" if last else "train"}"' + ("  # GUESS: the last file judges" if last else "")]
     return "\n".join(lines) + "\n"
 
 
-def about(columns: Mapping[str, Array], renamed: Mapping[str, str]) -> str:
+def about(columns: Mapping[str, Array], measured: str) -> str:
     """Return rows, rate, rest and sensor of a record in words."""
     times = columns["time_s"]
-    measured = next(h for h in renamed.values() if not h.startswith(("drive_", CURRENT, COMMAND)))
     values = columns[measured]
     present = np.flatnonzero(np.isfinite(values))
     first = values[present[:FEWEST_REST_SAMPLES]]

@@ -74,7 +74,7 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[C
             size = f"up to {np.max(np.abs(signal)):.3g}" if is_finite else "diverges"
             measured = f"{np.max(np.abs(replay.measured)):.3g} {replay.record.unit}"
             text = f"simulated {size} with parameters in the middle of their ranges, measured up to {measured}"
-            yield ContractPoint(f"moves in {replay.record.file}", is_finite, text)
+            yield ContractPoint(f"moves in {replay.name}", is_finite, text)
         yield from plausible(data_issues(campaign, model, space))
     except ArmidError as error:
         yield ContractPoint("model", False, str(error))

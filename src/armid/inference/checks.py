@@ -411,7 +411,9 @@ def band_tests(seen: Residuals) -> Iterator[Finding]:
     white = [level.rms * r for level, r in zip(seen.data.levels, seen.renewed, strict=True)]
     raw = [bridged(x, r) for x, r in zip(seen.raw, seen.replays, strict=True)] if coloured else white
     left = spectra(raw, seen, hum)
-    rests = spectra([r.rest - np.mean(r.rest) for r in seen.data.each], seen, hum) if coloured else {}
+    # an output with gaps may have no rest where another has one
+    still = [r.rest - np.mean(r.rest) if r.rest.size else r.rest for r in seen.data.each]
+    rests = spectra(still, seen, hum) if coloured else {}
     flat = 1.0 if seen.data.sized else float(np.mean(np.concatenate(seen.renewed) ** 2))
     for band, values in sorted(left.items()):
         other = rests.get(band, [])

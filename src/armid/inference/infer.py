@@ -145,8 +145,7 @@ class Inference:
             "unknown": post.probability("unknown"),
             "records": listed(post.of_kind("record")),
             "drifts": listed(post.of_kind("drift")),
-            "constants": {f.unknown.name.removeprefix(NAMED): f.value for f in self.best.others
-                          if f.unknown.name.startswith(NAMED)},
+            "constants": self.best.deviations,
         }  # fmt: skip
 
     def partners(self, model: Hypotheses, hypothesis: Hypothesis) -> dict[str, float]:
@@ -169,7 +168,7 @@ class Inference:
                           np.empty((len(fit.residual), 0)))  # fmt: skip
         of_noise = dict(zip(fit.values, fit.records.span * np.sqrt(np.diag(spread(alone))), strict=True))
         sizes = [f.unknown.name for f in self.best.others if not f.unknown.name.startswith(NAMED)]
-        constants = [f.unknown.name.removeprefix(NAMED) for f in self.best.others if f.unknown.name.startswith(NAMED)]
+        constants = self.best.deviations
         which = f" ({', '.join(constants)})" if 0 < len(constants) <= MOST_CONSTANTS else ""
         parts = ["where something unknown acts"] if self.posterior.best_is_unknown else []
         parts += [f"{CONSTANTS_TEXT}{which}"] if constants else [f"size of {sizes[0]}"] if sizes else []
@@ -211,11 +210,12 @@ def in_box(space: Space, name: str, low: float, high: float) -> tuple[float, flo
 
 
 def sentence_of(chances: Mapping[str, Any]) -> str:
-    """Return probabilities in one line: the effects, faults of records, nothing, and what nobody knows."""
+    """Return probabilities in one line: the effects, faults of records, drifts, nothing, and what nobody knows."""
     named = [f"{name} {p:.2f}" for name, p in chances["effects"].items()]
     left = len(named) - MOST_LEADING
     more = [f"{left} other{'s' if left > 1 else ''}"] if left > 0 else []
-    faults = [f"{name} {p:.2f}" for kind in ("records", "drifts") for name, p in chances[kind].items()]
+    faults = [f"{name} {p:.2f}" for name, p in chances["records"].items()]
+    faults += [f"drift of {name.removeprefix(NAMED)} {p:.2f}" for name, p in chances["drifts"].items()]
     return "; ".join([*named[:MOST_LEADING], *more, *faults[:MOST_LEADING], f"nothing missing {chances['nothing']:.2f}",
                       f"something that the library does not hold {chances['unknown']:.2f}"])  # fmt: skip
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.errors import ArmidError
-from armid.estimation.constants import Product, products
+from armid.estimation.constants import NAMED, Product, products
 from armid.estimation.information import information_at, start_changes
 from armid.estimation.least_squares import AT_BOUND, MOST_ROUNDS, SETTLED_CHI2, descend, held_by_bound, promised_fall
 from armid.inference.candidates import Active, EffectKey, idle
@@ -141,6 +141,11 @@ class Fit:
                 if (null := self.model.parameters[name].null) is not None}  # fmt: skip
         strengths = [[is_away for name, is_away in away.items() if key.owns(name)] for key in self.active]
         return any(own and not any(own) for own in strengths)
+
+    @property
+    def deviations(self) -> dict[str, float]:
+        """How far each constant within a tolerance is from its declared value, in its standard deviations."""
+        return {f.unknown.name.removeprefix(NAMED): f.value for f in self.others if f.unknown.name.startswith(NAMED)}
 
     def products(self, tolerances: Mapping[str, float]) -> tuple[Product, ...]:
         """Return the constants within tolerances that the records see at the fit, see `products`."""

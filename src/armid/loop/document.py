@@ -9,6 +9,7 @@ import numpy as np
 from armid.errors import ArmidError
 from armid.estimation.identify import versions_of
 from armid.estimation.identify_document import PACKAGES_OF_IDENTIFY
+from armid.estimation.information import NORMAL_95
 from armid.inference.candidates import ERROR_OF
 from armid.inference.carry_over import missed_sentences, over_noise
 from armid.inference.checks import Finding, Residuals, time_in_words
@@ -16,6 +17,7 @@ from armid.inference.decisions import LISTED, OVER_NOISE, SIGNIFICANCE
 from armid.inference.hypothesis import words
 from armid.inference.infer import Inference, sentence_of
 from armid.inference.missing_signal import Missing
+from armid.inference.model import Fit
 from armid.inference.posterior import UNSEEN
 from armid.loop.figures import figures_of, record_figure
 from armid.loop.result import (
@@ -336,6 +338,7 @@ def details_of(loop: ClosedLoop) -> dict[str, Any]:
     Of long records each curve keeps the samples that `thinned` chooses.
     """
     before, after = loop.before, loop.after
+    in_force = loop.inference.exploration.fits[loop.inference.in_force]
     records = [*record_entries(before.train, after.train), *record_entries(before.holdout, after.holdout)]
     diagnoses = {
         name: {role: None if seen is None else diagnosis_sentences(seen)
@@ -345,7 +348,7 @@ def details_of(loop: ClosedLoop) -> dict[str, Any]:
     return plain({
         "versions": versions_of(PACKAGES_OF_IDENTIFY),
         "conclusion": conclusion(loop),
-        "shifts": shift_sentences(before, after) if loop.steps else [],
+        "shifts": (shift_sentences(before, after) if loop.steps else []) + constant_sentences(in_force),
         "doubts": doubt_sentences(after),
         "suspects": [fault_sentence(s) for s in loop.suspects],
         "declared_by": declared_by(loop),
@@ -560,6 +563,12 @@ def shift_sentences(before: Judgement, after: Judgement) -> list[str]:
             said.append(f"{old.name} was biased by {share:+.2%}: {value_text(old.entry)} before, "
                         f"{value_text(new.entry)} after.")  # fmt: skip
     return said
+
+
+def constant_sentences(fit: Fit) -> list[str]:
+    """Say which constants are farther from their declared values than 95 % of sound ones."""
+    return [f"{name} is {abs(off):.1f} deviations from its declared value."
+            for name, off in fit.deviations.items() if abs(off) > NORMAL_95]  # fmt: skip
 
 
 def doubt_sentences(judged: Judgement) -> list[str]:
