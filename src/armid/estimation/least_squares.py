@@ -31,7 +31,7 @@ T = TypeVar("T")
 # Step of the differences, as a share of the range: above rounding, below curvature. Ranges of strengths are wide.
 STEP = 1e-6
 # A parameter this close to its bound, as a share of the range, is held by the bound and not by the records.
-AT_BOUND = 1e-4
+AT_BOUND = 1e-5
 # Relative fall of chi2 in one step at which a fit has arrived.
 TOLERANCE = 1e-9
 

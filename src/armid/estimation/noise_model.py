@@ -178,8 +178,8 @@ def levels_in_motion(
     """Return the noise of each record as a model that may be right shows it.
 
     A rest tells nothing of noise that grows with the reading, nor of a speed from differences of counts, whose noise
-    alternates. Of the noise that is known, and of these two, what makes the residuals of a sensor most probable counts,
-    each number that it takes costing half a log of the samples (Schwarz 1978, doi:10.1214/aos/1176344136).
+    alternates. Of the noise that is known, white noise of another size, and these two, what makes the residuals of a
+    sensor most probable counts, each number that it takes costing half a log of the samples (Schwarz 1978, doi:10.1214/aos/1176344136).
     left: of each record, its unit, not whitened.
     """
     records, plant = [r.record for r in replays], replays[0].model.plant
@@ -189,7 +189,9 @@ def levels_in_motion(
         known, theirs, parts = (list(one) for one in zip(*group, strict=True))
         readings = [r.measured for r in theirs]
         floor = max(hiding_noise(plant, sensor[0], FINE), *(r.record.signals[0].sensor.step / 12**0.5 for r in theirs))
-        options = [(0, known[0]), (2, growing_level(readings, parts, floor)), (2, alternating_level(parts, floor))]
+        white = white_level(max(float(np.sqrt(np.mean(np.concatenate(parts) ** 2))), floor), 0)
+        options = [(0, known[0]), (1, white), (2, growing_level(readings, parts, floor)),
+                   (2, alternating_level(parts, floor))]  # fmt: skip
         n = sum(map(len, parts))
         probable = [sum(log_density(level, r, x) for r, x in zip(readings, parts, strict=True)) - 0.5 * k * np.log(n)
                     for k, level in options]  # fmt: skip
