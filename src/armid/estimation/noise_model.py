@@ -31,6 +31,9 @@ MOST_TERMS, FEWEST_FOR_COLOUR, MOST_LAGS_OF_NOISE = 8, 50, 500
 MISFIT, ENGINE_ERRORS = 2.0, 3.0
 # Chance below which a residual is not noise; independent samples in the blocks whose means are looked at.
 CHANCE_OF_COLOUR, BLOCKS = 1e-3, (8, 32)
+# Of differences of counts the whole error of a sample comes back in the next one, with other noise less of it; by
+# chance a small share does.
+LEAST_ALTERNATION = 0.5
 # What is assumed for a record without noise, as a share of its rms speed.
 ASSUMED = 1e-3
 
@@ -179,7 +182,8 @@ def levels_in_motion(
 
     A rest tells nothing of noise that grows with the reading, nor of a speed from differences of counts, whose noise
     alternates. Of the noise that is known, white noise of another size, and these two, what makes the residuals of a
-    sensor most probable counts, each number that it takes costing half a log of the samples (Schwarz 1978, doi:10.1214/aos/1176344136).
+    sensor most probable counts. Each number that it takes costs half a log of the samples (Schwarz 1978,
+    doi:10.1214/aos/1176344136).
     left: of each record, its unit, not whitened.
     """
     records, plant = [r.record for r in replays], replays[0].model.plant
@@ -238,7 +242,7 @@ def alternating_level(parts: Sequence[Array], floor: float) -> NoiseModel:
     def size(alternation: float) -> float:
         return float(np.sqrt(np.mean(np.concatenate([without_alternation(x, alternation) for x in parts]) ** 2)))
 
-    alternation = float(minimize_scalar(size, bounds=(0.0, 1.0), method="bounded").x)
+    alternation = float(minimize_scalar(size, bounds=(LEAST_ALTERNATION, 1.0), method="bounded").x)
     rms = max(size(alternation) * float(np.sqrt(1.0 + alternation**2)), floor)
     return replace(white_level(rms, 0), innovation=rms / float(np.sqrt(1.0 + alternation**2)), alternation=alternation)
 
