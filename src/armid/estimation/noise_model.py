@@ -181,9 +181,9 @@ def levels_in_motion(
     """Return the noise of each record as a model that may be right shows it.
 
     A rest tells nothing of noise that grows with the reading, nor of a speed from differences of counts, whose noise
-    alternates. Of the noise that is known, white noise of another size, and these two, what makes the residuals of a
-    sensor most probable counts. Each number that it takes costs half a log of the samples (Schwarz 1978,
-    doi:10.1214/aos/1176344136).
+    alternates; differences of a motion tell of the first. They count where they make the residuals of a sensor more
+    probable than the noise that is known does, and white noise of any size. Each number that they take costs half a log
+    of the samples (Schwarz 1978, doi:10.1214/aos/1176344136).
     left: of each record, its unit, not whitened.
     """
     records, plant = [r.record for r in replays], replays[0].model.plant
@@ -194,13 +194,14 @@ def levels_in_motion(
         readings = [r.measured for r in theirs]
         floor = max(hiding_noise(plant, sensor[0], FINE), *(r.record.signals[0].sensor.step / 12**0.5 for r in theirs))
         white = white_level(max(float(np.sqrt(np.mean(np.concatenate(parts) ** 2))), floor), 0)
-        options = [(0, known[0]), (1, white), (2, growing_level(readings, parts, floor)),
-                   (2, alternating_level(parts, floor))]  # fmt: skip
+        options = [(0, known[0]), (1, white), (2, alternating_level(parts, floor))]
+        options += [(2, growing_level(readings, parts, floor))] if known[0].known else []
         n = sum(map(len, parts))
         probable = [sum(log_density(level, r, x) for r, x in zip(readings, parts, strict=True)) - 0.5 * k * np.log(n)
                     for k, level in options]  # fmt: skip
         shown[sensor] = options[int(np.argmax(probable))][1]
-    return tuple(shown[sensor_of(r)] for r in records)
+    found = [shown[sensor_of(r)] for r in records]
+    return tuple(new if new.in_motion else level for new, level in zip(found, levels, strict=True))
 
 
 def log_density(level: NoiseModel, readings: Array, residual: Array) -> float:

@@ -422,7 +422,7 @@ def with_noise_in_motion(library: Library, inference: Inference) -> Library:
         return library
     seen = train_residuals(fit)
     levels = levels_in_motion(read.levels, seen.replays, seen.raw)
-    if levels == read.levels or not (is_unknown or any(level.alternation for level in levels)):
+    if not any(level.in_motion for level in levels):
         return library
     noisy = library.with_data(read.with_levels(levels))
     noisy = with_measured_inputs(noisy, fit) if library.as_read else noisy
