@@ -31,8 +31,8 @@ MOST_TERMS, FEWEST_FOR_COLOUR, MOST_LAGS_OF_NOISE = 8, 50, 500
 MISFIT, ENGINE_ERRORS = 2.0, 3.0
 # Chance below which a residual is not noise; independent samples in the blocks whose means are looked at.
 CHANCE_OF_COLOUR, BLOCKS = 1e-3, (8, 32)
-# Of differences of counts the whole error of a sample comes back in the next one, with other noise less of it; by
-# chance a small share does.
+# Least share of an error that comes back in the next sample, with the other sign, where noise alternates. That of
+# differences of counts is 1, less where the sensor has other noise too. White noise shows a small share by chance.
 LEAST_ALTERNATION = 0.5
 # What is assumed for a record without noise, as a share of its rms speed.
 ASSUMED = 1e-3
@@ -72,7 +72,7 @@ class NoiseModel:
 
     @property
     def in_motion(self) -> str:
-        """What the noise does in motion that no rest tells, in words."""
+        """What the noise does in motion and at no rest, in words."""
         if self.alternation:
             return "it alternates from sample to sample, as that of differences of counts does"
         return f"in motion it grows with the reading, by {self.growth:.2%} of it" if self.growth else ""
@@ -112,9 +112,9 @@ class NoiseModel:
 
 
 def without_alternation(values: Array, alternation: float) -> Array:
-    """Return values whose noise e_t = w_t - alternation w_(t-1) is white then: by its Cholesky factor.
+    """Return values without the correlation of their noise, which is w_t - alternation w_(t-1) at sample t.
 
-    values: (..., n_samples).
+    By the Cholesky factor of its covariance. values: (..., n_samples).
     """
     n = values.shape[-1]
     covariance = np.array([[1.0 + alternation**2], [-alternation]]) * np.ones(n)
@@ -163,7 +163,7 @@ def levels_left(
         moved = changing(replay.measured)
         parts.append(part[moved] if moved.sum() >= FEWEST_REST_SAMPLES else part)
     records = [r.record for r in replays]
-    steps = by_sensor(records, [r.signals[0].sensor.step / np.sqrt(12.0) for r in records])
+    steps = by_sensor(records, [r.signals[0].sensor.rounding for r in records])
     shown = {sensor: memory_and_sizes(several) for sensor, several in by_sensor(records, parts).items()}
     noises = []
     for replay, level in zip(replays, levels, strict=True):
@@ -180,10 +180,11 @@ def levels_in_motion(
 ) -> tuple[NoiseModel, ...]:  # fmt: skip
     """Return the noise of each record as a model that may be right shows it.
 
-    A rest tells nothing of noise that grows with the reading, nor of a speed from differences of counts, whose noise
-    alternates; differences of a motion tell of the first. They count where they make the residuals of a sensor more
-    probable than the noise that is known does, and white noise of any size. Each number that they take costs half a log
-    of the samples (Schwarz 1978, doi:10.1214/aos/1176344136).
+    A rest does not show noise that grows with the reading; where records have no rest, differences of the motion have
+    shown its size. A rest does not show the noise of a speed from differences of counts either, which alternates.
+    Such noise counts where the residuals of a sensor are more probable with it than with the known noise and with white
+    noise of any size. Each of its parameters costs half the log of the number of samples (Schwarz 1978,
+    doi:10.1214/aos/1176344136).
     left: of each record, its unit, not whitened.
     """
     records, plant = [r.record for r in replays], replays[0].model.plant
@@ -192,7 +193,7 @@ def levels_in_motion(
     for sensor, group in grouped.items():
         known, theirs, parts = (list(one) for one in zip(*group, strict=True))
         readings = [r.measured for r in theirs]
-        floor = max(hiding_noise(plant, sensor[0], FINE), *(r.record.signals[0].sensor.step / 12**0.5 for r in theirs))
+        floor = max(hiding_noise(plant, sensor[0], FINE), *(r.record.signals[0].sensor.rounding for r in theirs))
         white = white_level(max(float(np.sqrt(np.mean(np.concatenate(parts) ** 2))), floor), 0)
         options = [(0, known[0]), (1, white), (2, alternating_level(parts, floor))]
         options += [(2, growing_level(readings, parts, floor))] if known[0].known else []

@@ -410,11 +410,11 @@ def with_noise(library: Library, declared: Fit) -> tuple[Library, Fit]:
 
 
 def with_noise_in_motion(library: Library, inference: Inference) -> Library:
-    """Return the library with the noise that the model in force shows, itself where nothing asks for it.
+    """Return the library with the noise in motion that the model in force shows, else the library as it is.
 
-    Where something unknown is in the records, noise that no rest tells may be all of it: where the records are more
-    probable with such noise than with an unknown signal, and no test finds more. Where a model may be right and no rest
-    tells the noise, that which alternates is looked for too: it looks larger than it is, and hides what is missing.
+    If an unknown signal is probable, noise in motion takes its place if the records are more probable with it and no
+    test finds more. If a model may be right and records have no rest, alternating noise is looked for too: its
+    differences make it look larger than it is, which hides effects.
     """
     fit, best = inference.exploration.fits[inference.in_force], inference.best
     is_unknown, read = inference.posterior.probability("unknown") >= MENTIONED, library.as_read or library.data

@@ -83,7 +83,7 @@ class Library:
         there = {other.public for other in active}
         return [k for k in self.candidates if k.public not in there and k not in self.left_out]
 
-    @property
+    @cached_property
     def left_out(self) -> dict[EffectKey, str]:
         """The effects that a free parameter does already, which are not tried, and its name."""
         return {key: name for key, name in self.doubles.items() if name not in self.tolerances}

@@ -260,12 +260,12 @@ def with_standstills(data: WhitenedData) -> WhitenedData:
 
 def standstill_columns(record: Record, level: NoiseModel, piece: int) -> Array:
     """Return the rounding error of each long run of equal values of a piece, whitened, (n_samples, n_runs)."""
-    n, step = record.lengths[piece], record.signals[0].sensor.step
+    n, sensor = record.lengths[piece], record.signals[0].sensor
     first = sum(record.lengths[:piece])
-    standstills = runs(record.seen[first : first + n], FEWEST_REST_SAMPLES) if step else []
+    standstills = runs(record.seen[first : first + n], FEWEST_REST_SAMPLES) if sensor.step else []
     columns = np.zeros((len(standstills), n))
     for column, (a, b) in zip(columns, standstills, strict=True):
-        column[a:b] = step / np.sqrt(12.0)
+        column[a:b] = sensor.rounding
     # scipy's filter refuses an empty array
     return level.white(columns, [n]).T if standstills else columns.T
 
@@ -276,7 +276,7 @@ def whitened(records: Sequence[Record], plant: Plant, trained: WhitenedData | No
     levels = noise_levels(each, plant, more)
     if trained is not None:
         theirs = dict(zip(map(sensor_of, more), trained.levels, strict=True))
-        # a rest of these does not tell what a model had to show of the noise in motion
+        # a rest of these does not show the noise in motion that a model showed on the train records
         levels = tuple(level if level.known and (own is None or own.known) else own or level for level, own in
                        zip(levels, [theirs.get(sensor_of(r)) for r in each], strict=True))  # fmt: skip
     return with_standstills(WhitenedData(tuple(records), levels, soundness_of(each, levels)))

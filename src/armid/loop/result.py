@@ -226,7 +226,9 @@ class ClosedLoop(Result):
         levels, train = self.before.train.data.levels, self.after.train
         entries = entries_of_noise(train.replays, [level.rms for level in levels], train.candidate)
         for replay, level in zip(train.replays, levels, strict=True):
-            entries[train.model.plant.outputs[replay.place].name]["noise_in_motion"] = level.in_motion
+            # records of one output may have sampling intervals, hence noises, of their own
+            entry = entries[train.model.plant.outputs[replay.place].name]
+            entry["noise_in_motion"] = entry.get("noise_in_motion") or level.in_motion
         return entries
 
     @property

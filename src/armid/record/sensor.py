@@ -62,6 +62,11 @@ class Sensor:
     step: float = 0.0
     hold: int = 1
 
+    @property
+    def rounding(self) -> float:
+        """Rms of what it rounds away [unit of the output]."""
+        return self.step / math.sqrt(12.0)
+
 
 def sensor_of(values: Array) -> Sensor:
     """Return the sensor of the values of one output as they were read, (n_rows,)."""

@@ -65,7 +65,7 @@ def signal_of(
     n_new = int(rows.sum())
     jumps = np.cumsum(np.any([after_sudden(x) for x in inputs], axis=0)) if inputs else np.zeros(values.size)
     new = New(values, rows, times, timing)
-    wild = wild_samples(new.values, max(difference_rms(new.motion, new.uneven), sensor.step / np.sqrt(12.0)))
+    wild = wild_samples(new.values, max(difference_rms(new.motion, new.uneven), sensor.rounding))
     broken = {"spikes": new.at[wild & ~new.since(jumps)]}
     rows[broken["spikes"]] = False
     new = New(values, rows, times, timing)

@@ -58,8 +58,8 @@ def state_shown(
     The outputs are functions h of the states x. At the start their values are h(x), and they change by dh/dx f(x). The
     rates f depend there on states and constants alone (the rate of a position is a speed). Values and slopes of the
     smoothed outputs, each weighed by its deviation, are met by least squares. What no output shows keeps its default,
-    with the plant's own size for its deviation. inputs: from this sample on, which tell how long the machine may stand
-    still.
+    with the plant's own size for its deviation. inputs: from this sample on; while they do not change the machine may
+    stand still.
     """
     outputs = VisibleOutputs(plant, given)
     names = [c for c in plant.start_constants.values() if c not in given]
@@ -97,7 +97,7 @@ def n_still(inputs: Sequence[Array]) -> int:
     if not inputs:
         return 0
     changed = np.flatnonzero(np.any([u != u[0] for u in inputs], axis=0))
-    return max(int(changed[0]) if changed.size else len(inputs[0]), *lengths_of_rest(inputs), 0)
+    return max([int(changed[0]) if changed.size else len(inputs[0]), *lengths_of_rest(inputs)])
 
 
 class VisibleOutputs:
@@ -153,8 +153,8 @@ def smoothed(values: Array, index: int, noise: float, slope: bool = False, still
     are tried all the same. The value is that of the polynomial with these two degrees more, so that its bias is small
     against its deviation. The window of the smallest deviation wins; a signal without noise is not smoothed. Source of
     the higher degree: Calonico, Cattaneo, Titiunik 2014, doi:10.3982/ECTA11757.
-    still: samples from there on during which inputs stand still. Where the signal does so too, its change is 0, as well
-    as they can tell: that of a straight line through n of them is 0 to the root of 12/n^3 of the noise.
+    still: number n of samples from there on in which no input changes. If the signal is constant there too, its change
+    is 0; the deviation is that of a straight line through these samples, noise * sqrt(12/n^3).
     """
     best = float(values[index]), noise
     if slope:

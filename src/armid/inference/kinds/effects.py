@@ -157,11 +157,10 @@ def change_by(records: WhiteRecords, candidate: Array, name: str, change: float)
 
     (n_samples,).
     """
-    both, shares = np.tile(candidate, (2, 1)), {name: np.array([0.0, change])}
-    if name in records.space.names:
+    both, is_parameter = np.tile(candidate, (2, 1)), name in records.space.names
+    if is_parameter:
         both[1, records.space.index(name)] += change
-        shares = {}
-    still, moved = records.whole_signals(both, shares)
+    still, moved = records.whole_signals(both, None if is_parameter else {name: np.array([0.0, change])})
     return np.asarray(moved - still)
 
 
