@@ -167,7 +167,7 @@ def pair_figure(
             axis.plot(*(factor * np.atleast_2d(values))[:, pair].T, ls="", **look)
         axis.set(xlabel=labels[pair[0]], ylabel=labels[pair[1]])
         axis.ticklabel_format(useOffset=False)
-        axis.locator_params(nbins=4)
+        axis.locator_params(nbins=3)
         axis.tick_params(axis="x", labelrotation=30, labelsize="small")  # values may have five digits
         axis.set_title(f"correlation {r:+.3f}", fontsize="small")
     legend_below(figure, 4)
