@@ -1,5 +1,7 @@
 """Motions that mislead: a fast axis with few samples and no rest, a pendulum upright, an axis with sharp friction."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -116,3 +118,20 @@ def test_force_mass_and_friction_that_grow_alike_are_not_told_apart_by_sharp_fri
         assert estimate.value == pytest.approx(truth / OFF, rel=0.01)
         assert estimate.high - estimate.low == pytest.approx(2 * 1.96 * TOLERANCE * estimate.value, rel=0.15)
         assert estimate.low < truth < estimate.high
+
+
+def test_dry_friction_of_the_machine_is_not_looked_for_in_another_form(tmp_path):
+    """Two smoothed signs are one friction, but an offset or presliding is another law."""
+    rng, toml = np.random.default_rng(3), 'name = "axis"\nplant = "driven_axis"\nhold = "zero"\n'
+    records = {f"r{i}.csv": table for i, table in enumerate(tables(rng))}
+    own = replace(EFFECTS["coulomb"].every_form[1], name="bearing", form="")
+    made = read_campaign(write_records(tmp_path / "made", toml, records, holdout=0))
+    motion = armid.simulate(made, effects=[own], parameters={"mass": MASS, "bearing.level": LEVEL})
+    for file, table in records.items():
+        speed = motion.tables[file]["velocity_m_s"]
+        table["velocity_m_s"] = speed + SMALL_NOISE * rng.standard_normal(len(speed))
+    declared = read_campaign(write_records(tmp_path / "declared", toml, records, holdout=0))
+    candidates = {n: EFFECTS[n] for n in ("coulomb", "viscous", "torque_offset", "presliding", "drive_gain")}
+    library, _ = prepared(Model(declared.plant) + own, declared, candidates)
+    assert {key.public: name for key, name in library.left_out.items()} == {"coulomb": "bearing.level"}
+    assert {key.form for key in library.left_out} == {"", "tanh"}

@@ -5,10 +5,11 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal
+from scipy.stats import multivariate_normal, norm
 
+from armid.estimation.constants import NAMED
 from armid.inference.decisions import Calibration, calibration
-from armid.inference.evidence import Expansion, Scale, forecast
+from armid.inference.evidence import Expansion, Scale, forecast, log_tails
 from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.posterior import Atom, Posterior, most_odds, truncated
 from armid.inference.whitening import Cover
@@ -69,6 +70,14 @@ def test_the_sides_of_a_strength_share_its_probability():
     either = forecast(expansion(residual), proposal(column, [2.0]))
     halves = [forecast(expansion(residual), proposal(side * column, [2.0], one_sided=True)) for side in (1.0, -1.0)]
     assert np.logaddexp(*(h.total for h in halves)) - np.log(2.0) == pytest.approx(either.total, abs=1e-6)
+
+
+@pytest.mark.parametrize("off", [0.0, 1.0, 4.0])
+def test_a_constant_may_be_off_as_its_tolerance_may_be_wrong(off):
+    """Against the mixture of two normal densities; other unknowns, such as the size of a fault, have no such tail."""
+    others = [SimpleNamespace(value=off, unknown=SimpleNamespace(name=name)) for name in (f"{NAMED}mass", "offset")]
+    mixture = 0.95 * norm.pdf(off) + 0.05 * norm.pdf(off, scale=3.0)
+    assert log_tails(SimpleNamespace(others=others)) == pytest.approx(np.log(mixture / norm.pdf(off)))
 
 
 def test_what_the_unknowns_can_do_says_nothing():

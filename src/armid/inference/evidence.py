@@ -23,6 +23,7 @@ from scipy.special import log_ndtr, logsumexp
 from armid.estimation.constants import NAMED
 from armid.inference.candidates import EffectKey
 from armid.inference.checks import is_significant
+from armid.inference.decisions import OUT_OF_TOLERANCE
 from armid.inference.hypothesis import Proposal
 from armid.inference.library import Library
 from armid.inference.model import Fit
@@ -30,6 +31,8 @@ from armid.model import Array
 
 # Prior standard deviations of a strength, as shares of its declared range: its size is known to orders of magnitude.
 SCALES_OF_STRENGTH = np.array([0.03, 0.1, 0.3, 1.0])
+# Prior standard deviation of a constant whose tolerance is wrong, in tolerances.
+WRONG_TOLERANCE = 3.0
 # Fewest independent samples of a residual that is more than noise.
 FEWEST_OF_RESIDUAL = 10.0
 # Largest exponent: exp(500) is still far from overflow.
@@ -290,6 +293,7 @@ def log_evidence(about: Expansion) -> float:
     share = scale.n / len(fit.residual)
     evidence -= 0.5 * float(sum(f.value**2 + share * f.unknown.lost(f.value) for f in fit.others))
     evidence -= 0.5 * fit.records.data.log_cover
+    evidence += log_tails(fit)
     for key in fit.active:
         evidence += log_strength(about, key)
     return evidence
@@ -318,6 +322,16 @@ def log_strength(about: Expansion, key: EffectKey) -> float:
     covariance = about.covariance[np.ix_(places, places)] / np.outer(size, size)
     densities = [log_normal(np.array(shares), covariance + s * s * np.eye(len(places))) for s in SCALES_OF_STRENGTH]
     return float(density + logsumexp(densities) - np.log(len(SCALES_OF_STRENGTH)) - np.sum(np.log(size)))
+
+
+def log_tails(fit: Fit) -> float:
+    """Return by how much the log prior of constants rises as a tolerance may be wrong: a normal one has no tail.
+
+    A constant is off by v tolerances with the density 0.95 N(v; 0, 1) + 0.05 N(v; 0, t^2).
+    """
+    v = np.array([f.value for f in fit.others if f.unknown.name.startswith(NAMED)])
+    wrong = 0.5 * v**2 * (1.0 - WRONG_TOLERANCE**-2.0) + np.log(OUT_OF_TOLERANCE / WRONG_TOLERANCE)
+    return float(np.sum(np.logaddexp(np.log1p(-OUT_OF_TOLERANCE), wrong)))
 
 
 def doubts_of(fit: Fit, library: Library) -> Array:

@@ -13,9 +13,19 @@ def coulomb_torque(omega, level, width):
     return -level * omega / np.sqrt(omega**2 + width**2)
 
 
+def tanh_torque(omega, level, width):
+    """Effort of Coulomb friction, -level tanh(omega/width)."""
+    return -level * np.tanh(omega / width)
+
+
+DRY_LEVEL = Parameter("level", "effort", 0.0, 0.5, null=0.0, note="friction at any speed")
+coulomb_tanh = Effect(
+    name="coulomb", form="tanh", adds={"torque": tanh_torque}, parameters=(DRY_LEVEL, SIGN_WIDTH),
+    note="friction of constant size against the motion", source="doi:10.1016/j.triboint.2005.11.014",
+)  # fmt: skip
 coulomb = Effect(
-    name="coulomb", adds={"torque": coulomb_torque},
-    parameters=(Parameter("level", "effort", 0.0, 0.5, null=0.0, note="friction at any speed"), SIGN_WIDTH),
+    name="coulomb", form="root", forms=(coulomb_tanh,), adds={"torque": coulomb_torque},
+    parameters=(DRY_LEVEL, SIGN_WIDTH),
     note="friction of constant size against the motion", source="doi:10.1016/0005-1098(94)90209-7",
 )  # fmt: skip
 
