@@ -15,8 +15,7 @@ MOST = 20
 # Constants that are compared with and decide nothing that a user is told, by what they are.
 NUMERICS = {
     "rounding": ("DEPENDENT", "NEGLIGIBLE", "ROUNDING_OF_SIGNAL", "ROUGHLY", "LEAST_CHANCE"),
-    "whether differences tell a slope": ("BELIEVED", "LEAST_RISE", "PARALLEL", "SAME_RESPONSE", "BENT_RISE",
-                                         "FOLLOWED"),
+    "whether differences tell a slope": ("BELIEVED", "LEAST_RISE", "BENT_RISE", "FOLLOWED"),
     "convergence of fits and of the engine": ("SETTLED_COST", "NEAR_NOISE", "FEWEST_SPARED", "FURTHER_ERROR",
                                               "WIDE", "FORETOLD"),
     "budgets of computing": ("FEWEST_IN_BUNDLES", "MOST_IN_VAIN", "MOST_EFFECTS", "MOST_OF_SIZE", "MOST_RIVALS",

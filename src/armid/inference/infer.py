@@ -22,10 +22,10 @@ from armid.inference.checks import is_significant, train_residuals
 from armid.inference.decisions import LISTED, MENTIONED, calibration
 from armid.inference.evidence import Expansion, expansion_of
 from armid.inference.hypothesis import Hypotheses, Hypothesis
-from armid.inference.kinds import effects
 from armid.inference.library import Library, library_of
 from armid.inference.model import ROUGHLY, Fit, accurate, fit_from, start_of
 from armid.inference.posterior import CONSTANTS_TEXT, Posterior, posterior, spread
+from armid.inference.same_law import doubles
 from armid.inference.search import Exploration, explore, without_denied
 from armid.inference.whitening import WhiteRecords, whitened, with_answers
 from armid.model import EFFECTS, Array, Effect, Model
@@ -290,7 +290,7 @@ def prepared(
     problem = library.problem(())
     library = library.about(with_fitted_starts(problem.replays, problem.space))
     library, declared = with_input_noise(*with_noise(*with_scales(library)))
-    return replace(library, doubles=effects.doubles(declared, library)), declared
+    return replace(library, doubles=doubles(declared, library)), declared
 
 
 def infer(library: Library, declared: Fit) -> Inference:

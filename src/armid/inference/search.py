@@ -5,6 +5,7 @@ of the best are not expanded. To first order additions, pairs and swaps come fro
 leads is fitted again, as a forecast ranks and does not judge.
 """
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -302,7 +303,10 @@ def expand(exploration: Exploration, model: Hypotheses) -> None:
     if is_significant(fit):
         trials += best_begun(exploration, model, held, ahead_held, limit, N_ADDED)
     else:
-        added = [i for i, f in enumerate(ahead) if max(f.posterior, ahead_held[i].posterior) > REFITTED]
+        # forms share the prior of a name: that a name has more of them makes none less worth a fit
+        forms = Counter(f.proposal.hypothesis.name for f in ahead)
+        added = [i for i, f in enumerate(ahead) if max(f.posterior, ahead_held[i].posterior)
+                 + np.log(forms[f.proposal.hypothesis.name]) > REFITTED]  # fmt: skip
         for i in sorted(added, key=lambda i: -max(ahead[i].posterior, ahead_held[i].posterior))[:N_ADDED]:
             trials += trial_of(exploration, model, held, ahead_held[i], limit)
     trials += [t for f in leading(beside) for t in trial_of(exploration, model, about, f, limit)]
@@ -312,8 +316,8 @@ def expand(exploration: Exploration, model: Hypotheses) -> None:
         trials += exchanges(exploration, model, fit, limit)
     trials += drops(exploration, model)
     if not is_far and exploration.log_posterior(model, scale) > ranked[0][1] - WINDOW:
-        forms = effects.propose_forms(fit, exploration.known, library)
-        trials += swaps(exploration, model, fit, scale, [*proposals, *forms], limit)
+        others = effects.propose_forms(fit, exploration.known, library)
+        trials += swaps(exploration, model, fit, scale, [*proposals, *others], limit)
     made = library.each(lambda t: t[1](), trials)
     for (key, _), again in zip(trials, made, strict=True):
         exploration.take_or_refuse(key, again)

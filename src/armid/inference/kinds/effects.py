@@ -14,7 +14,6 @@ from armid.inference.library import Library, activation_grid
 from armid.inference.model import (
     ROUGHLY,
     Fit,
-    candidate_at,
     fit_from,
     free_values,
     problem_about,
@@ -33,12 +32,6 @@ SHARES_TRIED = (SLOPE, 0.05, 0.4)
 N_STARTS_OF_EFFECT = 4
 # First steps of a fit, after which it shows how far it may lead.
 N_FIRST_STEPS = 2
-# An effect may be one parameter of the model where this parameter explains such a share of its squared response. Two
-# forms of one law differ by up to 2e-4 of it, two laws by 2e-3 and more in some company (measured on nine machines).
-# Other effects act meanwhile with such shares of their size, one after the other.
-PARALLEL, SAME_RESPONSE, COMPANY = 0.9, 1e-3, (0.03, 0.1, 0.3)
-# How often the change of the parameter that does the same is corrected.
-N_SECANTS = 3
 
 
 def hypotheses(library: Library) -> dict[EffectKey, Hypothesis]:
@@ -105,86 +98,6 @@ def proposal(fit: Fit, hypothesis: Hypothesis, key: EffectKey, library: Library)
     return Proposal(
         hypothesis, moved[good], SCALES_OF_STRENGTH, variants, partial(refit, key, library), one_sided=True, grid=chosen
     )
-
-
-def doubles(fit: Fit, library: Library) -> dict[EffectKey, str]:
-    """Return the effects that do what the declared model does by itself, and nothing else, with what does it.
-
-    That is a free parameter, or a constant that is known within a tolerance. Viscous friction is the damping of a
-    machine that has one: records cannot tell two shares of one quantity, and its interval would reach from none of it
-    to all. Its sign may be smoothed in another form. Both are moved side by side, in the company of other effects, weak
-    and strong: a wrong gain of the drive looks like another mass only until something else acts.
-    """
-    keys, products = library.joinable(()), fit.products(library.tolerances)
-    names = [*fit.values, *(p.names[0] for p in products)]
-    slopes = np.column_stack([fit.jacobian / fit.records.span, *(p.slope for p in products)])
-    found = library.each(lambda key: double(fit, key, library, names, slopes), keys)
-    return {key: name for key, name in zip(keys, found, strict=True) if name}
-
-
-def double(fit: Fit, key: EffectKey, library: Library, own: list[str], slopes: Array) -> str:
-    """Return what of the declared model does what an effect does, "" for nothing.
-
-    own: its parameters, and constants; slopes: change of the whitened signal by each, (n_samples, n).
-    """
-    records = beside(fit, (key,), library)
-    known, declared = strengths(records, library), records.model.parameters
-    names = known.get(key, [])
-    company = [n for other, theirs in known.items() if other.public != key.public for n in theirs]
-    if len(names) != 1 or not company or not own:
-        return ""
-    alone, step = candidate_at(records, fit.values), SLOPE * library.strength_of(names[0], declared[names[0]])
-    response, squares = change_by(records, alone, names[0], step), np.maximum(np.sum(slopes**2, axis=0), 1e-300)
-    along = slopes.T @ response / squares
-    best = int(np.argmax(along**2 * squares))
-    if not along[best] ** 2 * squares[best] > PARALLEL * float(response @ response):
-        return ""
-    for share in COMPANY:
-        at_work = alone.copy()
-        for other in company:
-            at_work[records.space.index(other)] += share * library.strength_of(other, declared[other])
-        if not is_same(records, at_work, (names[0], step), (own[best], float(along[best]))):
-            return ""
-    return own[best]
-
-
-def is_same(records: WhiteRecords, candidate: Array, one: tuple[str, float], other: tuple[str, float]) -> bool:
-    """Tell whether a change of a parameter does what some change of another, or of a constant, does.
-
-    one, other: name, and the change; that of the other is a first guess.
-    """
-    response, (name, change) = change_by(records, candidate, *one), other
-    for _ in range(N_SECANTS):
-        by_other = change_by(records, candidate, name, change)
-        apart = response - by_other
-        if float(apart @ apart) < SAME_RESPONSE * float(response @ response):
-            return True
-        change *= float(response @ by_other) / max(float(by_other @ by_other), 1e-300)
-    return False
-
-
-def change_by(records: WhiteRecords, candidate: Array, name: str, change: float) -> Array:
-    """Return the change of the whitened signal where a parameter of a candidate changes, or a constant by a share.
-
-    (n_samples,).
-    """
-    both, is_parameter = np.tile(candidate, (2, 1)), name in records.space.names
-    if is_parameter:
-        both[1, records.space.index(name)] += change
-    still, moved = records.whole_signals(both, None if is_parameter else {name: np.array([0.0, change])})
-    return np.asarray(moved - still)
-
-
-def strengths(records: WhiteRecords, library: Library) -> dict[EffectKey, list[str]]:
-    """Return the strengths of each candidate of a compiled model, but of those whose shapes are times."""
-    parameters: dict[EffectKey, list[str]] = {}
-    for name in records.space.names:
-        owner = library.owner(name)
-        if owner is not None:
-            parameters.setdefault(owner, []).append(name)
-    declared = records.model.parameters
-    return {key: [n for n in names if declared[n].null is not None] for key, names in parameters.items()
-            if all(declared[n].unit != "s" for n in names)}  # fmt: skip
 
 
 def beside(fit: Fit, active: tuple[EffectKey, ...], library: Library) -> WhiteRecords:
