@@ -43,12 +43,9 @@ def estimates(n, scale):
     })  # fmt: skip
 
 
-def test_verdict():
+def test_verdict_and_none_of_too_few_realisations_or_without_a_bound():
     for scale, verdict in ((0.01, "yes"), (0.02, "no"), (0.005, "no")):
         assert efficiencies(estimates(2000, scale))["verdict"].tolist() == [verdict]
-
-
-def test_too_few_realisations_and_bounds_that_do_not_exist_say_nothing():
     assert efficiencies(estimates(19, 0.01)).empty
     assert efficiencies(estimates(50, 0.01).assign(deviation=np.inf)).empty
 

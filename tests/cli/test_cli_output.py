@@ -4,7 +4,6 @@ import json
 import logging
 import warnings
 from functools import partial
-from shutil import copytree
 from threading import Event, Thread
 
 import pytest
@@ -16,6 +15,7 @@ from armid.record.campaign import warned_once
 from armid.report import files, html, style
 from armid.report.document import Column, Struck, Table, table
 from armid.report.terminal import print_table
+from commands import not_drawn
 
 QUICK = ("--budget", "80", "--window", "0:0.4")
 # A call of each command that needs no long work; OUT stands for a new folder, CAMPAIGN for a campaign of two records.
@@ -40,20 +40,8 @@ WIDE = table(
 )  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def study(table_study, tmp_path_factory):
-    return copytree(table_study, tmp_path_factory.mktemp("study") / "tiny") / "out"
-
-
-def not_drawn(figure, *paths):
-    style.pyplot().close(figure)
-    for path in paths:
-        path.write_text("<svg/>")
-    return "<svg/>"
-
-
 @pytest.fixture
-def called(run, small_folder, study, tmp_path, monkeypatch):
+def called(run, small_folder, store, tmp_path, monkeypatch):
     """Return a function that runs each call with more words, no figure drawn: (its words, what it left)."""
     for module, name in ((files, "save"), (style, "save"), (html, "svg_text")):
         monkeypatch.setattr(module, name, not_drawn)
@@ -61,7 +49,7 @@ def called(run, small_folder, study, tmp_path, monkeypatch):
     def all_of(lines, *more):
         for i, line in enumerate(lines):
             words = [
-                {"CAMPAIGN": small_folder, "STUDY": study, "OUT": tmp_path / f"{i}{more}"}.get(w, w)
+                {"CAMPAIGN": small_folder, "STUDY": store, "OUT": tmp_path / f"{i}{more}"}.get(w, w)
                 for w in line.split()
             ]
             yield line, run(*words, *more)
