@@ -3,7 +3,6 @@
 import sys
 from inspect import signature
 from itertools import count
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -120,15 +119,12 @@ def test_memory_rows_compare_ten_times_the_work(monkeypatch: pytest.MonkeyPatch)
     assert (unknown.measured, unknown.met) == (None, None)
 
 
-def test_start_up_calls_the_command_with_a_campaign(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_start_up_calls_the_command_and_says_why_it_failed(tmp_path, monkeypatch):
     # a folder of its own: other tests compile into the shared one meanwhile
     monkeypatch.setenv("ARMID_CACHE", str(tmp_path))
     row = startup_row(rounds=1, command=STAND_IN, n_samples=60)
     assert 0 < row.ratio < np.inf
     assert "compiled nothing" in row.note
-
-
-def test_start_up_says_why_the_command_failed() -> None:
     command = (sys.executable, "-c", "raise SystemExit('no such thing')")
     with pytest.raises(ArmidError, match="no such thing"):
         startup_row(rounds=1, command=command, n_samples=60)
