@@ -5,6 +5,7 @@ import shutil
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +20,8 @@ from armid.model import EFFECTS
 from armid.problem.space import space_of
 from armid.record import read_campaign, write_table
 from armid.record.table import read_table
+from synthetic import Array, write_records
 from synthetic import moved as stepped
-from synthetic import write_records
 
 SPEED = "angular_velocity_deg_s"
 TRAIN = ("lower.csv", "raise.csv", "short.csv", "empty.csv")
@@ -48,15 +49,6 @@ def rewritten(function, *files):
 
 def change(column, function, *files):
     return rewritten(lambda columns: columns | {column: function(columns[column])}, *files)
-
-
-def header(old, new, *files):
-    def made(folder):
-        for file in files:
-            path = folder / file
-            path.write_text(path.read_text().replace(old, new, 1))
-
-    return made
 
 
 def toml(*pairs, more=""):
@@ -126,16 +118,20 @@ def noise(*files):
     return change(SPEED, lambda x: np.random.default_rng(5).normal(0, 20, x.size), *files)
 
 
+@cache
+def swing(size: float, pace: float, friction: float) -> Array:
+    """Return angle [deg] and speed [deg/s] of the pendulum under a drive: many tests want the same ones."""
+    drive = size * np.sin(pace * 0.004 * np.arange(900)) + 0.1
+    rates = lambda x, u: np.array([x[1], (u - 0.4 * np.sin(x[0]) - friction * x[1]) / 0.06])  # noqa: E731
+    return np.rad2deg(stepped(rates, drive, 0.004, (0.0, 0.0))).T
+
+
 def pendulum(folder: Path, seed: int = 1, friction: float = 0.004) -> Path:
     """Write a SYNTHETIC driven pendulum with friction that is not declared, by Runge-Kutta steps of its own."""
     rng, times, tables = np.random.default_rng(seed), 0.004 * np.arange(900), {}
-
-    def rates(x, u):
-        return np.array([x[1], (u - 0.4 * np.sin(x[0]) - friction * x[1]) / 0.06])
-
     for file, size, pace in zip(AXIS, (0.5, 0.35, 0.6), (2.0, 5.0, 3.1), strict=True):
         drive = size * np.sin(pace * times) + 0.1
-        angle, speed = np.rad2deg(stepped(rates, drive, 0.004, (0.0, 0.0))).T
+        angle, speed = swing(size, pace, friction)
         tables[file] = {"time_s": times, "angular_velocity_deg_s": speed + rng.normal(0, 0.3, times.size),
                         "angle_deg": angle + rng.normal(0, 0.05, times.size), "drive_N_m": drive}  # fmt: skip
     return write_records(folder, PENDULUM, tables)
@@ -185,18 +181,25 @@ MISTAKES: dict[str, tuple[str, tuple[Callable[[Path], None], ...], str]] = {
 }  # fmt: skip
 
 
+@pytest.fixture(scope="module")
+def sparser(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a sparser campaign of the arm, and one of one record."""
+    folder = tmp_path_factory.mktemp("sparser")
+    for kind, name in (("arm", "four_strokes"), ("one", "one_stroke")):
+        shutil.copytree(root / "studies" / "campaigns" / name, folder / kind)
+        for file in (folder / kind).glob("*.csv"):
+            write_table(file, {n: v[::EVERY] for n, v in read_table(file, file.name).columns.items()})
+    return folder
+
+
 @pytest.fixture
-def campaign(root: Path, tmp_path: Path) -> Callable[[str], Path]:
+def campaign(sparser: Path, tmp_path: Path) -> Callable[[str], Path]:
     """Return a function that makes a fresh, sparser campaign: arm, one (one record), axis, rubbing (more friction)."""
 
     def made(kind: str) -> Path:
         if kind in ("axis", "rubbing"):
             return pendulum(tmp_path / kind, friction=0.05 if kind == "rubbing" else 0.004)
-        folder = tmp_path / kind
-        shutil.copytree(root / "studies" / "campaigns" / {"arm": "four_strokes", "one": "one_stroke"}[kind], folder)
-        for file in folder.glob("*.csv"):
-            write_table(file, {n: v[::EVERY] for n, v in read_table(file, file.name).columns.items()})
-        return folder
+        return shutil.copytree(sparser / kind, tmp_path / kind)
 
     return made
 
