@@ -78,22 +78,21 @@ def test_refuses_a_function_that_a_record_cannot_feed(function: Any, sentence: s
     assert sentence in str(refusal.value)
 
 
-def test_refuses_an_unknown_join() -> None:
-    with pytest.raises(ValueError, match="joins records by 'durations', did you mean 'duration'"):
-        Fitness("mine", lambda measured, simulated: 0, join="durations")
-
-
-@pytest.mark.parametrize("weights", [(1.0, 0.0), (1.0, np.nan)])
-def test_refuses_weights_that_do_not_fit(weights: tuple[float, ...]) -> None:
-    with pytest.raises(ValueError, match="weighs records"):
-        record_weights(FITNESS["rmse"], (1.0, 1.0), weights)
-
-
-def test_likelihood_needs_noise() -> None:
+def test_refuses_noise_that_is_none_a_measurement_of_zero_and_an_unknown_join() -> None:
     x, rows = records()[0]
     for noise in (None, 0.0):
         with pytest.raises(ValueError, match="noise"):
             FITNESS["likelihood"](x, rows, noise=noise)
+    for noise in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match="expected an rms above 0"):
+            chi_square(*records()[0], noise)
+    with pytest.raises(ValueError, match="zero throughout"):
+        relative_mean_square(np.zeros(3), np.ones((1, 3)))
+    with pytest.raises(ValueError, match="joins records by 'durations', did you mean 'duration'"):
+        Fitness("mine", lambda measured, simulated: 0, join="durations")
+    for weights in ((1.0, 0.0), (1.0, np.nan)):
+        with pytest.raises(ValueError, match="weighs records"):
+            record_weights(FITNESS["rmse"], (1.0, 1.0), weights)
 
 
 def noisy() -> tuple[Array, Array]:
@@ -142,11 +141,3 @@ def test_warped_time_names_the_package_that_it_needs(monkeypatch: pytest.MonkeyP
     monkeypatch.setitem(sys.modules, "dtaidistance.dtw", None)
     with pytest.raises(ValueError, match="needs the package dtaidistance, which is not installed"):
         FITNESS["dtw"](*noisy(), interval=0.001)
-
-
-def test_refuses_noise_that_is_none_and_a_zero_measurement_to_divide_by() -> None:
-    for noise in (0.0, -1.0, np.nan, np.inf):
-        with pytest.raises(ValueError, match="expected an rms above 0"):
-            chi_square(*records()[0], noise)
-    with pytest.raises(ValueError, match="zero throughout"):
-        relative_mean_square(np.zeros(3), np.ones((1, 3)))

@@ -25,7 +25,7 @@ def test_grants_exactly_the_budget() -> None:
         simulate(meter, [1.0])
 
 
-def test_keeps_the_best_and_each_improvement() -> None:
+def test_keeps_each_improvement_and_the_best_which_is_neither_nan_nor_failed() -> None:
     meter = Meter(100)
     assert (meter.best_x, meter.best_f) == (None, np.inf)
     simulate(meter, [5.0, 7.0, 5.0, 3.0])
@@ -37,9 +37,6 @@ def test_keeps_the_best_and_each_improvement() -> None:
     assert meter.best_f == 1.0
     assert meter.best_x is not None
     assert meter.best_x.tolist() == [2.0, 1.0]
-
-
-def test_neither_nan_nor_a_failed_candidate_is_the_best() -> None:
     meter = Meter(100, target=0.5)
     simulate(meter, [np.nan, np.inf, 0.1], [False, False, True])
     assert (meter.best_x, meter.best_f, meter.reached, meter.n_failed) == (None, np.inf, False, 1)
@@ -83,7 +80,7 @@ def test_refuses_what_does_not_match() -> None:
         meter.record([[1.0, 2.0, 3.0]], [1.0])
 
 
-def test_the_termination_follows_the_meter() -> None:
+def test_the_termination_follows_the_meter_its_target_and_its_generations_and_a_copy_does() -> None:
     meter = Meter(4, target=0.0)
     termination = MeterTermination(meter)
     for used in range(4):
@@ -92,9 +89,6 @@ def test_the_termination_follows_the_meter() -> None:
         simulate(meter, [1.0])
     termination.update(SimpleNamespace(n_gen=1))
     assert termination.has_terminated()
-
-
-def test_the_termination_ends_at_the_target_and_at_its_generations() -> None:
     meter = Meter(1000, target=0.5)
     termination = MeterTermination(meter, n_max_gen=4)
     assert [termination.update(SimpleNamespace(n_gen=n)) for n in (1, 3, 4)] == [0.25, 0.75, 1.0]
@@ -102,9 +96,6 @@ def test_the_termination_ends_at_the_target_and_at_its_generations() -> None:
     assert termination.update(SimpleNamespace(n_gen=1)) == 1.0
     with pytest.raises(ValueError, match="n_max_gen is 0"):
         MeterTermination(meter, 0)
-
-
-def test_a_copied_termination_looks_at_the_same_meter() -> None:
     termination = MeterTermination(Meter(10), 7)
     termination.terminate()
     twin = copy.deepcopy(termination)

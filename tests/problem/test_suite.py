@@ -74,14 +74,11 @@ def test_making_the_suite_compiles_nothing(tmp_path):
     assert (done.stdout, done.returncode) == ("4\n", 0), done.stderr
 
 
-def test_the_truth_is_the_optimum_where_there_is_no_noise():
+def test_the_truth_is_the_optimum_without_noise_which_sets_the_floor():
     for name in ("arm/2", "arm_similarity/2", "arm_shape/2"):
         problem = armid.suite()[name]
         assert problem(problem.truth) == problem.optimum_value == problem.floor == 0.0
         assert (problem.optimum_x == problem.truth).all()
-
-
-def test_noise_sets_the_floor():
     noisy = armid.suite()["arm_noisy/2"]
     assert noisy.floor == pytest.approx(np.deg2rad(0.3), rel=0.1)
     assert 0.98 * noisy.floor < noisy.optimum_value < noisy.floor
@@ -92,7 +89,7 @@ def test_noise_sets_the_floor():
     assert similar.floor > 0.0
 
 
-def test_a_call_takes_a_vector_or_an_array_in_either_unit():
+def test_a_call_takes_a_vector_or_an_array_in_either_unit_and_gives_one_objective_a_record():
     box, own = armid.suite()["arm/3"], armid.suite(units="SI")["arm/3"]
     u = np.random.default_rng(1).random((5, 4))
     values = box(u)
@@ -106,9 +103,6 @@ def test_a_call_takes_a_vector_or_an_array_in_either_unit():
     assert own.names[0] == "p0"
     assert own.xl[0] == 2.6e6
     assert box.cost_s > 0.0
-
-
-def test_one_objective_a_record():
     several = armid.suite("records")
     assert len(several) < len(armid.suite())
     problem, joined = several["arm_four/1"], armid.suite()["arm_four/1"]

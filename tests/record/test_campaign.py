@@ -50,7 +50,7 @@ def write_two(write, arm_columns):
     return lambda **parts: write(arm(**parts), lower=arm_columns, empty=arm_columns)
 
 
-def test_folder_and_file_read_alike(write_two):
+def test_folder_and_file_read_alike_and_samples_before_zero_are_rest(write_two, arm_columns):
     folder = write_two()
     by_folder, by_file = read_campaign(folder), read_campaign(str(folder / "campaign.toml"))
     assert by_folder.name == by_file.name == "c00"
@@ -62,9 +62,6 @@ def test_folder_and_file_read_alike(write_two):
     assert [r.file for r in by_folder.train] == ["lower.csv"]
     assert [r.file for r in by_folder.holdout] == ["empty.csv"]
     assert by_folder.holdout[0].repeat_of == "lower.csv"
-
-
-def test_samples_before_zero_are_rest(write_two, arm_columns):
     record = read_campaign(write_two()).train[0]
     speed = arm_columns["angular_velocity_deg_s"] * DEGREE
     np.testing.assert_array_equal(record.rest, speed[:100])
@@ -131,17 +128,7 @@ def test_spellings_of_csv(write, encode):
 TABLES = {"a.csv": {"time_s": np.arange(5) / 3, "velocity_m_s": np.array([0.1, 1e-300, -7.0, 1 / 3, 1e20])}}
 
 
-def test_numbers_read_back_to_the_bit(tmp_path):
-    folder = write_campaign(tmp_path / "deep" / "out", "name = 'x'\n", TABLES)
-    assert (folder / "campaign.toml").read_text() == "name = 'x'\n"
-    columns = read_table(folder / "a.csv", "a.csv").columns
-    assert list(columns) == ["time_s", "velocity_m_s"]
-    for name, values in TABLES["a.csv"].items():
-        np.testing.assert_array_equal(columns[name], values)
-    assert [p.name for p in folder.parent.iterdir()] == ["out"]
-
-
-def test_nothing_is_overwritten_and_nothing_half_written_stays(tmp_path):
+def test_nothing_is_overwritten_or_half_written_and_numbers_read_back_to_the_bit(tmp_path):
     (tmp_path / "empty").mkdir()
     folder = write_campaign(tmp_path / "empty", "", TABLES)
     for there in (folder, folder / "a.csv"):
@@ -153,3 +140,10 @@ def test_nothing_is_overwritten_and_nothing_half_written_stays(tmp_path):
     with pytest.raises(ValueError, match="shorter"):
         write_campaign(tmp_path / "out", "", uneven)
     assert list(tmp_path.iterdir()) == [folder]
+    folder = write_campaign(tmp_path / "deep" / "out", "name = 'x'\n", TABLES)
+    assert (folder / "campaign.toml").read_text() == "name = 'x'\n"
+    columns = read_table(folder / "a.csv", "a.csv").columns
+    assert list(columns) == ["time_s", "velocity_m_s"]
+    for name, values in TABLES["a.csv"].items():
+        np.testing.assert_array_equal(columns[name], values)
+    assert [p.name for p in folder.parent.iterdir()] == ["out"]
