@@ -1,6 +1,7 @@
 """Campaigns of the proof of advice: few strokes, then the same ones and one record more."""
 
 import json
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -94,8 +95,6 @@ def test_the_proof_asks_for_six_pairs_of_twenty() -> None:
     assert (len(proof.pairs), proof.taken) == (6, 20)
     assert len({frozenset(pair.names) for pair in proof.pairs}) == 6
     for file in ("advice.toml", "advised.toml"):
-        import tomllib
-
         rivals = tomllib.loads((PROOF.parent / file).read_text())["rivals"]
         assert {pattern.rstrip("*"): set(names) for pattern, names in rivals.items()} == {
             pair.letter: set(pair.names) for pair in proof.pairs

@@ -89,7 +89,7 @@ def test_a_suite_is_the_same_from_one_process_or_two(small: Path, tmp_path: Path
     assert key_path(again).read_bytes() == key_path(small).read_bytes()
 
 
-def test_a_campaign_tells_nothing_of_its_truth(small: Path) -> None:
+def test_a_campaign_tells_nothing_of_its_truth_and_the_package_reads_it(small: Path) -> None:
     words = re.compile(r"effect|seed|true|noise|colou?r|white|p0|eta3|bias|class|index|key", re.IGNORECASE)
     assert sorted(each.name for each in small.iterdir()) == sorted(key_of(small)["campaigns"])
     assert {each.suffix for each in small.rglob("*") if each.is_file()} == {".toml", ".md", ".csv"}
@@ -99,9 +99,6 @@ def test_a_campaign_tells_nothing_of_its_truth(small: Path) -> None:
             assert not words.search(text), words.search(text)
             assert "SYNTHETIC and blind" in text
         assert (campaign / "lower.csv").read_text().startswith("time_s,angular_velocity_deg_s\n-0.200,")
-
-
-def test_the_package_reads_every_campaign(small: Path) -> None:
     for name, entry in key_of(small)["campaigns"].items():
         campaign = read_campaign(small / name)
         one = entry["class"] == "one_stroke"

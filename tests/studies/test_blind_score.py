@@ -54,15 +54,10 @@ def made(advised, random):
     return key, reports
 
 
-def judged_pairs(*choices):
-    """Return the rows of made campaigns, their rates, and question -> target."""
-    rows = advice.separations(*made(*choices))
-    rates = advice.rates(rows)
-    return rates.to_dict("records"), {t.question: t for t in advice.targets_of(rows, rates)}
-
-
 def test_rates_and_the_test_of_pairs():
-    (first, whole), aims = judged_pairs([1, 1, 1, 1, 0], [1, 0, 0, 0, 0])
+    rows = advice.separations(*made([1, 1, 1, 1, 0], [1, 0, 0, 0, 0]))
+    rates = advice.rates(rows)
+    (first, whole), aims = rates.to_dict("records"), {t.question: t for t in advice.targets_of(rows, rates)}
     assert (first["pair"], first["n"], first["tried"], first["in_doubt"]) == ("coulomb / brush_drop", 5, 9, 7)
     assert (first["advised"], first["random"], whole["advised"]) == (0.8, 0.2, 0.8)
     assert first["p"] == pytest.approx(0.5**3)
@@ -159,7 +154,7 @@ def suite(tmp_path_factory):
     return folder / "out"
 
 
-def test_the_page_shows_every_table_and_figure(suite):
+def test_the_page_shows_every_table_and_figure_and_the_tables_agree_with_the_judgements(suite):
     page = (suite / "report.md").read_text()
     assert "NOT COMPLETE: 119 of 120 campaigns" in page
     assert "| campaigns without a report | 1 | = 0 | 120 | missed |" in page
@@ -168,9 +163,6 @@ def test_the_page_shows_every_table_and_figure(suite):
     names = ("targets", "answers", "effects", "confusion", "false_alarms", "two", "unlisted", "one_stroke", "held_out")
     for table in (*names, "bias"):
         assert len(pd.read_csv(suite / f"{table}.csv")) > 0
-
-
-def test_the_tables_agree_with_the_judgements(suite):
     rows = pd.read_csv(suite / "campaigns.csv")
     single = rows[(rows["class"] == "single") & (rows["judgement"] != "missing")]
     assert set(single["answer"]) <= {*tables.ANSWERS}

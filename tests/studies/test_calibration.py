@@ -41,18 +41,23 @@ def test_names_that_nobody_can_tell_apart_share_their_truth():
     assert not truth_of(ENTRY, hidden=True).holds("drive_lag")
 
 
-def test_probabilities_that_come_true_have_no_error_and_sure_ones_that_do_not_have_all():
+def test_errors_of_probabilities_costs_of_intervals_and_targets_by_hand():
     rng = np.random.default_rng(1)
     p = rng.random(40_000)
     honest = list(zip(p, (rng.random(p.size) < p).astype(float), strict=True))
     assert calibration_error(honest) < 0.01
     assert [n for n, *_ in reliability(honest)] == [4000] * 10
     assert calibration_error([(0.9, 0.0)] * 20) == pytest.approx(0.9)
-
-
-def test_an_interval_that_misses_costs_forty_times_by_how_much():
     assert interval_score([(1.0, 0.99, 1.01)]) == pytest.approx(0.02)
     assert interval_score([(1.1, 1.05, 1.15)]) == pytest.approx(0.1 + 40.0 * 0.05)
+    sound = [[True]] * 19 + [[False]]
+    found = score("S2", "made up", "arm", sound, lambda one: one, ">= 0.97")
+    assert found.value == 0.95
+    assert found.met
+    assert not Score("S2", "made up", "arm", 20, 0.5, 0.4, 0.6, ">= 0.97").met
+    assert Score("S2", "made up", "arm", 20, 0.5, 0.4, 0.6).met is None
+    # all alike: the rule of three
+    assert score("S2", "made up", "arm", [[True]] * 30, lambda one: one).low == pytest.approx(0.9)
 
 
 def test_both_versions_are_compared_on_the_campaigns_that_both_closed():
@@ -65,17 +70,6 @@ def test_both_versions_are_compared_on_the_campaigns_that_both_closed():
     assert both.beside_former() == [(pytest.approx(0.1), pytest.approx(0.2))]
     assert ratio_of(median)(both.times_beside_former()) == 2.0
     assert Closed("one_001", "one", "arm", "arm", truth, ENTRY, mine).beside_former() == []
-
-
-def test_a_target_is_met_where_the_interval_touches_it():
-    sound = [[True]] * 19 + [[False]]
-    found = score("S2", "made up", "arm", sound, lambda one: one, ">= 0.97")
-    assert found.value == 0.95
-    assert found.met
-    assert not Score("S2", "made up", "arm", 20, 0.5, 0.4, 0.6, ">= 0.97").met
-    assert Score("S2", "made up", "arm", 20, 0.5, 0.4, 0.6).met is None
-    # all alike: the rule of three
-    assert score("S2", "made up", "arm", [[True]] * 30, lambda one: one).low == pytest.approx(0.9)
 
 
 @pytest.mark.slow

@@ -58,30 +58,24 @@ def test_one_word_for_each_report(label: str, truths: tuple[str, ...], verdict: 
     assert judge("c000", told, report(verdict, *steps))["judgement"] == word
 
 
-def test_a_wrong_name_with_a_group_is_not_alone() -> None:
+def test_a_wrong_name_with_a_group_is_not_alone_and_a_group_less_probable_than_a_claim_is_none() -> None:
     row = judge("c000", entry("single", "viscous"), report("cannot_tell_apart", PAIR))
     assert (row["wrong_alone"], row["wrong_group"], row["largest_group"], row["group_of_truth"]) == (False, True, 2, 0)
     row = judge("c000", entry("single", "viscous"), report("explained", COULOMB))
     assert (row["wrong_alone"], row["wrong_group"]) == (True, False)
-
-
-def test_a_group_that_is_less_probable_than_a_claim_is_none() -> None:
     told = report("cannot_tell_apart", PAIR)
     for probability, word in ((0.48, "right"), (0.47, "cannot_tell")):
         told["probabilities"]["effects"] = dict.fromkeys(("coulomb", "seal_friction"), probability)
         assert judge("c000", entry("single", "coulomb"), told)["judgement"] == word
 
 
-def test_errors_and_biases_are_reckoned() -> None:
+def test_errors_and_biases_are_reckoned_and_no_held_out_error_without_a_holdout() -> None:
     row = judge("c000", entry("single", "coulomb"), report("explained", COULOMB, after=0.006, bias=0.02))
     assert (row["before_over_floor"], row["after_over_floor"]) == pytest.approx((4.0, 1.2))
     assert row["cut"] == pytest.approx(0.7)
     assert row["excess_cut"] == pytest.approx(1.0 - (0.44 / 15.0) ** 0.5)
     assert row["bias_after_eta3"] == pytest.approx(0.02)
     assert row["trusted_n"] is False
-
-
-def test_a_record_without_holdout_has_no_held_out_error() -> None:
     told = report("cannot_tell_apart")
     told["error"]["before"]["holdout"] = told["error"]["after"]["holdout"] = None
     row = judge("c000", entry("one_stroke"), told)
@@ -107,15 +101,12 @@ def test_the_targets_count_what_they_say() -> None:
     assert found(rows, "20 %: share of all").found == pytest.approx(0.7)
 
 
-def test_a_target_that_nothing_tells_of_is_neither_met_nor_missed() -> None:
+def test_a_target_that_nothing_tells_of_is_neither_met_nor_missed_and_one_stroke_may_not_be_trusted() -> None:
     assert {each.met for each in targets_of([], 0)[1:]} == {None}
     assert targets_of([], 3)[0].met is False
-
-
-@pytest.mark.parametrize(("trusted", "met"), [(0.0, False), (0.3, True)])
-def test_one_stroke_may_not_be_trusted(trusted: float, met: bool) -> None:
-    rows = [judge("c", entry("one_stroke"), report("no_discrepancy", bias=trusted))]
-    assert found(rows, "eta3 or n trusted").met is met
+    for trusted, met in ((0.0, False), (0.3, True)):
+        rows = [judge("c", entry("one_stroke"), report("no_discrepancy", bias=trusted))]
+        assert found(rows, "eta3 or n trusted").met is met
 
 
 @pytest.fixture

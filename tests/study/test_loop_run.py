@@ -22,19 +22,15 @@ pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
 
 
-def the_stand(*words):
-    """Run the stand, a program that shares no code with the package."""
-    command = [sys.executable, str(ROOT / "studies" / "test_stand.py"), *map(str, words)]
-    subprocess.run(command, check=True, capture_output=True)
-
-
 @pytest.fixture(scope="module")
 def suite(tmp_path_factory):
     """A folder with the study, three campaigns, and their key."""
     folder = tmp_path_factory.mktemp("blind")
     (folder / "suite.toml").write_text(SUITE, encoding="utf-8")
     (folder / "blind.toml").write_text(STUDY, encoding="utf-8")
-    the_stand("blind", folder / "suite", "--seed", 3, "--suite", folder / "suite.toml", "--processes", 1)
+    words = ["blind", folder / "suite", "--seed", "3", "--suite", folder / "suite.toml", "--processes", "1"]
+    # a program that shares no code with the package
+    subprocess.run([sys.executable, ROOT / "studies" / "test_stand.py", *words], check=True, capture_output=True)
     return folder
 
 

@@ -77,27 +77,18 @@ def test_effects_of_a_sensor_are_looked_for_where_all_are(write):
     assert StudyRegistry().with_effects(arm, ["angle_bias"], "here").effects[0].name == "angle_bias"
 
 
-def test_all_effects_are_looked_for_unless_the_study_says_otherwise(write):
+def test_what_is_looked_for_in_which_campaigns_and_the_key_as_seen_from_the_store(write, tmp_path):
     text = re.sub(r"candidates = .*\n", "", STUDY)
     assert set(read_study(write(text=text)).candidates) == set(EFFECTS)
     assert set(read_study(write('without = ["tilt"]\n', text)).candidates) == set(EFFECTS) - {"tilt"}
-
-
-def test_a_key_is_told_as_seen_from_the_store(write, tmp_path):
-    told = read_study(write()).description(tmp_path / "results" / "blind")
-    assert told["key"] == "../../suite.key.json"
-    assert json.loads(json.dumps(told)) == told
-
-
-def test_rivals_are_looked_for_in_their_campaigns_alone(write):
     study = read_study(write('[rivals]\n"*0" = ["tilt"]\n'))
     assert study.candidates_for("c000") == ("tilt",)
     assert study.candidates_for("c001") == study.candidates
     assert ['"candidates":["tilt"]' in p.settings for p in study.plan()] == [True, False]
-
-
-def test_some_campaigns_only(write):
     assert read_study(write('only = ["*1"]\n')).case_names == ["c001"]
+    told = read_study(write()).description(tmp_path / "results" / "blind")
+    assert told["key"] == "../../suite.key.json"
+    assert json.loads(json.dumps(told)) == told
 
 
 @pytest.mark.parametrize(

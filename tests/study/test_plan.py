@@ -48,7 +48,7 @@ def test_without_a_folder_results_go_where_git_ignores_them(write_study, tmp_pat
     assert "out/" in (STUDIES.parent / ".gitignore").read_text().splitlines()
 
 
-def test_noise_is_paired(write_study):
+def test_noise_is_paired_white_and_as_loud_as_told_and_a_window_shows_a_part_of_a_record(write_study):
     study = read_study(write_study(2))
     one = replays_of(study, case="row 1", identifier="random", noise_deg_s=0.3, seed=1)[0]
     for other in ({"identifier": "pso", "fitness": "similarity"}, {"identifier": "pso+least_squares"}):
@@ -56,9 +56,6 @@ def test_noise_is_paired(write_study):
         assert np.array_equal(one.measured, same.measured)
     again = replays_of(study, case="row 1", identifier="random", noise_deg_s=0.3, seed=2)[0]
     assert not np.any(one.measured == again.measured)
-
-
-def test_noise_is_white_and_of_the_level_that_the_likelihood_is_told(write_study):
     study = read_study(write_study(1, change=("noise_deg_s = [0.0, 0.3]", "noise_deg_s = [0.0, 0.3, 0.6]")))
     clean = replays_of(study, case="row 1", noise_deg_s=0.0)[0]
     for level in (0.3, 0.6):
@@ -69,9 +66,6 @@ def test_noise_is_white_and_of_the_level_that_the_likelihood_is_told(write_study
         assert abs(np.mean(noise**2) - 1.0) < 4.0 * np.sqrt(2.0 / n)
         assert abs(np.mean(noise)) < 4.0 / np.sqrt(n)
         assert abs(np.mean(noise[1:] * noise[:-1])) < 4.0 / np.sqrt(n)
-
-
-def test_a_window_shows_a_part_of_the_same_record(write_study):
     study = read_study(write_study(1, change=("[[0.0, 0.3]]", '[[0.05, 0.2], "whole"]')))
     part = replays_of(study, case="row 5", noise_deg_s=0.3, window="0.05-0.2 s")
     whole = replays_of(study, case="row 5", noise_deg_s=0.3, window="whole")
