@@ -24,6 +24,7 @@ from armid.registry import load_registry
 from armid.report.result import Result, Shown
 from armid.report.style import pyplot
 from armid.units import angles_in, scale_of
+from commands import not_drawn
 
 QUICK = {"effects": ["viscous"], "budget": 60}
 
@@ -344,7 +345,8 @@ def test_the_log_is_printed_from_a_level_on(capsys):
 
 
 @pytest.mark.slow
-def test_a_study_shows_itself(table_study, tmp_path):
+def test_a_study_shows_itself(table_study, tmp_path, monkeypatch):
+    monkeypatch.setattr("armid.report.files.save", not_drawn)
     out = copytree(table_study / "out", tmp_path / "out")
     results = armid.run_study(table_study / "tiny.toml", jobs=1, out=out)
     shows(results, tmp_path)

@@ -59,11 +59,6 @@ def blocks(readme):
 
 
 @pytest.fixture(scope="module")
-def commands(blocks):
-    return [line for language, text in blocks if not language for line in text.splitlines() if line]
-
-
-@pytest.fixture(scope="module")
 def recipes(root):
     """The recipes of studies/make_results.py."""
     return runpy.run_path(str(root / "studies" / "make_results.py"))["RECIPES"]
@@ -88,7 +83,7 @@ def committed(root, folder):
     return [root / name for name in names] or [path for path in (root / folder).rglob("*") if path.is_file()]
 
 
-def test_begins_with_two_commands_to_copy(blocks, root):
+def test_begins_with_two_commands_to_copy_and_is_short(blocks, root, readme):
     first, second = (text.strip().splitlines() for language, text in blocks[:2] if not language)
     assert len(first) == len(second) == 1
     assert "armid study studies/table1_short.toml" in first[0]
@@ -97,9 +92,6 @@ def test_begins_with_two_commands_to_copy(blocks, root):
         assert line.startswith("python3 -m venv .venv && .venv/bin/pip install -q -e ")
     words = shlex.split(first[0])
     assert (root / words[words.index("study") + 1]).is_file()
-
-
-def test_the_readme_is_short(readme):
     prose = [line for line in FENCE.sub("", readme).splitlines() if not line.startswith("|")]
     assert len(LINK.sub("]", " ".join(prose)).split()) <= MOST_WORDS
 
@@ -130,7 +122,8 @@ def test_every_option_exists_and_all_is_written_to_out(page, root):
         assert places or words[0] not in ("study", "new", "import", "close-loop", "simulate"), line
 
 
-def test_the_commands_run_and_git_ignores_what_they_write(commands, root, elsewhere, capsys):
+def test_the_commands_run_and_git_ignores_what_they_write(blocks, root, elsewhere, capsys):
+    commands = [line for text in blocks_of(blocks, "") for line in text.splitlines()]
     ours = [line for line in commands if line.startswith("armid ") and not any(part in line for part in LEFT_OUT)]
     assert {line.split()[1] for line in ours} >= {"check", "identify"}
     for line in ours:
@@ -206,14 +199,13 @@ def shape(text):
             for words, line in lines if words]  # fmt: skip
 
 
-def alike(shown, printed):
-    return shown[0] == printed[0] and shown[1] == pytest.approx(printed[1], rel=NEAR)
-
-
 def is_part_of(shown, printed):
     """Tell whether the lines that are shown come one after the other in what was printed; `...` leaves some out."""
     left = iter(printed)
-    return all(line[0] == ["..."] or any(alike(line, other) for other in left) for line in shown)
+    return all(
+        words == ["..."] or any(words == other and numbers == pytest.approx(known, rel=NEAR) for other, known in left)
+        for words, numbers in shown
+    )
 
 
 def ran(line, capsys):
