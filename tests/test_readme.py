@@ -140,7 +140,14 @@ def test_the_python_examples_run(blocks, elsewhere):
     assert re.match(r"\{'p0': .*'n': ", ran.stdout)
 
 
-def test_the_campaign_file_is_read(elsewhere, root):
+def test_files_that_pages_name_are_there_links_lead_somewhere_and_the_campaign_file_is_read(root, elsewhere):
+    for page in {*LINKED, *MOST_LINES}:
+        text = (root / page).read_text(encoding="utf-8")
+        for name in re.findall(r"`((?:studies|results)/[a-z][\w/.]+)`", text) if page in GUIDES else ():
+            assert (root / name).exists(), name
+        for link in set(LINK.findall(text)) - set(UNWRITTEN) if page in LINKED else ():
+            assert "//" in link or (root / page).parent.joinpath(link).resolve().exists(), (page, link)
+        assert len(text.splitlines()) <= MOST_LINES.get(page, 10**6), page
     found = FENCE.findall((root / TOUR).read_text(encoding="utf-8"))
     text = next(text for text in blocks_of(found, "toml") if 'plant = "shell_transfer_arm"\n[[records]]' in text)
     assert tomllib.loads(text)["records"]
@@ -149,26 +156,13 @@ def test_the_campaign_file_is_read(elsewhere, root):
     assert [r.file for r in read_campaign(elsewhere).train] == ["lower.csv"]
 
 
-def test_files_that_pages_name_are_there_links_lead_somewhere_and_pages_stay_short(root):
-    for page in {*LINKED, *MOST_LINES}:
-        text = (root / page).read_text(encoding="utf-8")
-        for name in re.findall(r"`((?:studies|results)/[a-z][\w/.]+)`", text) if page in GUIDES else ():
-            assert (root / name).exists(), name
-        for link in set(LINK.findall(text)) - set(UNWRITTEN) if page in LINKED else ():
-            assert "//" in link or (root / page).parent.joinpath(link).resolve().exists(), (page, link)
-        assert len(text.splitlines()) <= MOST_LINES.get(page, 10**6), page
-
-
-def test_results_hold_what_is_read_and_are_small(root, recipes):
+def test_results_hold_what_is_read_are_small_and_every_figure_is_shown_and_has_a_recipe(root, recipes):
     files = committed(root, "results")
     assert {path.suffix for path in files} <= {".csv", ".md", ".json", ".png"}
     assert sum(path.stat().st_size for path in files) <= MOST_MB * 1e6
     folders = {path.relative_to(root / "results").parts[0] for path in files if path != root / RESULTS}
     assert folders <= set(recipes)
     assert folders == {link.split("/")[0] for link in LINK.findall((root / RESULTS).read_text()) if "." in link}
-
-
-def test_every_committed_figure_is_shown_and_has_a_recipe(root, recipes):
     figures = {path.resolve() for path in committed(root, "results") if path.suffix == ".png"}
     shown = {
         (root / page).parent.joinpath(name).resolve()

@@ -68,15 +68,6 @@ POINT = st.tuples(st.integers(1, 500), st.floats(0.0, 2.0))
 SERIES = st.lists(POINT, min_size=1, max_size=20, unique_by=lambda p: p[0]).map(sorted)
 
 
-@pytest.fixture(scope="module")
-def kept(made):
-    """Results of 60 runs, the last of which failed, their outcomes and their histories."""
-    results = made(seeds=2, failed=1)
-    runs = outcomes(results.runs, results.parameters)
-    truths = {case["name"]: case["truth"] for case in results.study["cases"]}
-    return results, runs, histories(results, runs, truths, {})
-
-
 @given(SERIES)
 def test_first_hits_and_held_values_are_what_a_search_from_the_left_finds(series):
     evaluations, values = (np.array(column) for column in zip(*series, strict=True))
@@ -100,8 +91,11 @@ def test_the_tolerances_of_the_success_rates_are_targets_and_a_share_is_that_of_
     assert remaining_share(np.array([2.0]), np.nan, 1.0).tolist() == [np.inf]
 
 
-def test_hits_and_held_values_of_each_run_of_the_best_and_without_those_that_came_in_later(kept):
-    results, runs, found = kept
+def test_hits_and_held_values_of_each_run_of_the_best_and_without_those_that_came_in_later(made):
+    results = made(seeds=2, failed=1)
+    runs = outcomes(results.runs, results.parameters)
+    truths = {case["name"]: case["truth"] for case in results.study["cases"]}
+    found = histories(results, runs, truths, {})
     assert np.isinf(found.error_hits[-1]).all()
     assert np.isinf(found.values[-1]).all()
     for i, trace in list(enumerate(results.iter_traces()))[::7]:

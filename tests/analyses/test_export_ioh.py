@@ -3,6 +3,7 @@
 import json
 import warnings
 
+import iohinspector
 import numpy as np
 import pytest
 
@@ -22,22 +23,15 @@ def exported(made, tmp_path_factory):
     return folder, results, export_ioh(results, path_of)
 
 
-@pytest.fixture(scope="module")
-def loaded(exported):
-    import iohinspector
-
+def test_every_run_that_ended_well_is_there_and_every_improvement_comes_back_bit_for_bit(exported):
     manager = iohinspector.DataManager()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         manager.add_folder(str(exported[0]))
-    return manager
-
-
-def test_every_run_that_ended_well_is_there_and_every_improvement_comes_back_bit_for_bit(exported, loaded):
     _, results, n_runs = exported
     done = results.runs[results.runs["status"] == "done"]
-    assert n_runs == loaded.n_runs == len(done) == 88
-    overview = loaded.overview.to_pandas()
+    assert n_runs == manager.n_runs == len(done) == 88
+    overview = manager.overview.to_pandas()
     assert set(overview["algorithm_name"]) == {"pso", "cmaes", "de+bobyqa"}
     assert overview["function_id"].nunique() == 10
     assert set(overview["dimension"]) == {4}
@@ -48,7 +42,7 @@ def test_every_run_that_ended_well_is_there_and_every_improvement_comes_back_bit
         found = named.loc[(run.identifier, f"{run.case}, {noise}, similarity", run.seed)]
         assert found["best_y"] == run.value
         assert found["evals"] == run.used
-    rows = loaded.load(monotonic=False, include_meta_data=True).to_pandas()
+    rows = manager.load(monotonic=False, include_meta_data=True).to_pandas()
     trace = results.kept[3]
     run = results.runs.set_index("run").loc[trace.run]
     own = rows[(rows["algorithm_name"] == run["identifier"]) & (rows["instance"] == run["seed"])

@@ -60,25 +60,22 @@ def test_a_study_shows_its_fitness_in_the_unit_of_its_records(made, angle, label
     plt.close(figure)
 
 
-def test_runs_are_counted_with_their_failures_and_reasons(made):
-    evidence = Evidence(made(seeds=1, noises=(0.0,), failed=2))
-    counts = runs_table(evidence.runs, evidence.parameters).frame.set_index("variant")
-    assert counts["failed"].to_dict() == {"pso": 0, "cmaes": 1, "de+bobyqa": 1}
-    found = reasons(evidence.runs).frame.groupby("reason")["n"].sum().to_dict()
-    assert found == {"budget used": 13, "failed: it broke": 2}
-
-
 def outcomes_with(errors):
     return pd.DataFrame({"setting": "noise-free", "variant": "pso", "largest_error": errors})
 
 
-def test_success_at_the_tolerance_of_failed_runs_and_of_unknown_truths_with_its_interval():
+def test_success_at_the_tolerance_with_its_interval_and_runs_are_counted_with_their_failures(made):
     row = success(outcomes_with([1e-2, 0.0099, 0.02, np.inf, np.nan])).frame.iloc[0]
     assert (row["n"], row["within_1_percent_successes"], row["within_0.1_percent_successes"]) == (4, 2, 0)
     assert (row["within_1_percent_rate"], row["within_0.1_percent_rate"]) == (0.5, 0.0)
     table = success(outcomes_with([1e-5] * 8 + [1.0] * 2))
     # Wilson's interval of 8 of 10
     assert table.frame.loc[0, "within_1_percent_text"] == "80.0 (49.0 to 94.3)"
+    evidence = Evidence(made(seeds=1, noises=(0.0,), failed=2))
+    counts = runs_table(evidence.runs, evidence.parameters).frame.set_index("variant")
+    assert counts["failed"].to_dict() == {"pso": 0, "cmaes": 1, "de+bobyqa": 1}
+    found = reasons(evidence.runs).frame.groupby("reason")["n"].sum().to_dict()
+    assert found == {"budget used": 13, "failed: it broke": 2}
 
 
 def test_the_error_map_has_medians_in_the_orders_given_and_deviations_are_in_percent(made):
@@ -134,9 +131,7 @@ def report(effects, after, holdout=0.03):
     return {"plant": "shell_transfer_arm", "effects": effects, "noise_rms": 0.01, "error": error}
 
 
-@pytest.fixture(scope="module")
-def closed():
-    """Results of three campaigns, one of which failed."""
+def test_closed_loops_have_a_row_each_and_a_report_that_counts_verdicts(tmp_path):
     loops = pd.DataFrame({
         "case": ["c0", "c1"], "verdict": ["explained", "no_discrepancy"], "cpu_seconds": [3.0, 0.5],
         "seconds": [4.0, 0.6], "report": [report(["tilt", "backlash"], 0.0101), report([], None)],
@@ -146,12 +141,8 @@ def closed():
         "campaigns": "campaigns/c", "made_by": "make them", "key": "key.json", "candidates": ["tilt"], "rivals": {},
         "versions": {"armid": "0"}, "n_planned": 3, "n_done": 2, "n_failed": 1,
     }  # fmt: skip
-    results = MadeResults(pd.DataFrame({"model": ["m", "m", None]}), pd.DataFrame(), study)
-    results.loops = loops
-    return results
-
-
-def test_closed_loops_have_a_row_each_and_a_report_that_counts_verdicts(closed, tmp_path):
+    closed = MadeResults(pd.DataFrame({"model": ["m", "m", None]}), pd.DataFrame(), study)
+    closed.loops = loops
     rows = loop_runs(closed.loops)
     assert rows["effects"].tolist() == ["tilt + backlash", "nothing"]
     assert rows["before"].tolist() == pytest.approx([3.0, 3.0])

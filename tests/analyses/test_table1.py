@@ -12,17 +12,9 @@ from armid.study.analyses.table2 import spread, table2
 PAPERS_MEANS = [0.487, 0.421, 0.171, 0.899]
 
 
-@pytest.fixture(scope="module")
-def estimates(made):
-    return Evidence(made(seeds=7)).estimates
-
-
-@pytest.fixture(scope="module")
-def rows(estimates):
-    return table1_rows(estimates, published_values({"cases": PAPER_CASES}))
-
-
-def test_one_row_by_hand_and_the_last_four_are_means_beside_the_papers(estimates, rows):
+def test_one_row_by_hand_and_the_last_four_are_means_beside_the_papers(made):
+    estimates = Evidence(made(seeds=7)).estimates
+    rows = table1_rows(estimates, published_values({"cases": PAPER_CASES}))
     key = {"setting": "0.3 deg/s", "variant": "pso", "case": "row 3", "parameter": "n"}
     own = estimates[np.all([estimates[k] == v for k, v in key.items()], axis=0)]
     row = rows[np.all([rows[k] == v for k, v in key.items()], axis=0)].iloc[0]

@@ -90,15 +90,6 @@ def test_json_is_one_object_and_quiet_prints_nothing(called, lines):
         assert (ran.code, bool(ran.out)) == (0, line.startswith("list")), line
 
 
-def test_a_point_that_takes_too_long_ends_the_check(run, tmp_path):
-    (tmp_path / "slow.py").write_text(
-        "import time\n\n\ndef slow(measured, simulated):\n    time.sleep(5.0)\n    return simulated[:, 0]\n"
-    )
-    ran = run("check", f"{tmp_path}/slow.py:slow", "--time-limit", "0.3")
-    assert ran.code == 1
-    assert "FAIL time limit: point 1 takes longer than 0.3 s" in ran.out
-
-
 def test_what_takes_long_is_announced_in_a_pipe_too(capsys):
     log = logging.getLogger("armid")
 
@@ -114,7 +105,13 @@ def test_what_takes_long_is_announced_in_a_pipe_too(capsys):
         assert capsys.readouterr() == ("", told)
 
 
-def test_the_doctor_tells_what_is_wrong(run, monkeypatch, tmp_path):
+def test_a_point_that_takes_too_long_ends_the_check_and_the_doctor_tells_what_is_wrong(run, monkeypatch, tmp_path):
+    (tmp_path / "slow.py").write_text(
+        "import time\n\n\ndef slow(measured, simulated):\n    time.sleep(5.0)\n    return simulated[:, 0]\n"
+    )
+    ran = run("check", f"{tmp_path}/slow.py:slow", "--time-limit", "0.3")
+    assert ran.code == 1
+    assert "FAIL time limit: point 1 takes longer than 0.3 s" in ran.out
     assert "3 of 3 points hold" in run("doctor").out
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("ARMID_CACHE", str(tmp_path / "file"))

@@ -66,12 +66,19 @@ def test_one_file_for_each_record_and_the_values_taken_or_missing(
     assert "parameter 'mass' has no nominal value: a value is expected (kg)" in sentence
 
 
-def test_what_a_campaign_fixes_is_taken_unless_it_is_set(run, paper_arm_folder, tmp_path):
+def test_what_a_campaign_fixes_is_taken_unless_it_is_set_and_steps_that_are_too_long_are_told(
+    run, paper_arm_folder, tmp_path
+):
     folder = tmp_path / "campaign"
     shutil.copytree(paper_arm_folder, folder)
     with (folder / "campaign.toml").open("a") as toml:
         toml.write("[parameters.n]\nfixed = 1.2\n[parameters.k]\nfixed = 0.9\n")
     assert "k = 0.8\neta3 = 0.55\nn = 1.2\n" in run("simulate", folder, "--set", "k=0.8", "--out", tmp_path).out
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")
+        ran = run("simulate", paper_arm_folder, "--set", "p0=1e12", "--out", tmp_path / "out")
+    assert re.match(r"armid: warning: lower\.csv: the engine is off by up to \S+ rad/s even at its finest ", ran.err)
+    assert "armid: warning: p0 = 1e+12 is far outside the declared range, 2.6e+06 to 3.5e+06 Pa" in ran.err
 
 
 def test_an_axis_from_its_first_sample_shown_from_zero_on(run, write_axis, axis_speed, tmp_path):
@@ -88,14 +95,6 @@ def test_an_axis_from_its_first_sample_shown_from_zero_on(run, write_axis, axis_
     np.testing.assert_allclose(times, np.arange(301) / 200, atol=1e-12)
     np.testing.assert_allclose(speed, axis_speed(times + 0.5), atol=3e-4)
     assert (np.diff(position) > 0).all()
-
-
-def test_steps_that_are_too_long_are_told(run, paper_arm_folder, tmp_path):
-    with warnings.catch_warnings():
-        warnings.simplefilter("default")
-        ran = run("simulate", paper_arm_folder, "--set", "p0=1e12", "--out", tmp_path / "out")
-    assert re.match(r"armid: warning: lower\.csv: the engine is off by up to \S+ rad/s even at its finest ", ran.err)
-    assert "armid: warning: p0 = 1e+12 is far outside the declared range, 2.6e+06 to 3.5e+06 Pa" in ran.err
 
 
 def test_what_it_writes_is_a_campaign_s_record_and_it_overwrites_nothing(run, paper_arm_folder, tmp_path, refused):

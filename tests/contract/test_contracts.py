@@ -33,7 +33,7 @@ def failures(findings):
     pytest.param(kind, name, thing, id=f"{kind}-{name}", marks=[pytest.mark.slow] if name in LONG else [])
     for kind, things in (("plants", PLANTS), ("fitness", FITNESS), ("identifiers", IDENTIFIERS))
     for name, thing in things.items() if not getattr(thing, "package", "")
-])  # fmt: skip
+] + [("identifiers", name, identifier_of(name, IDENTIFIERS)) for name in COMPOSED])  # fmt: skip
 def test_registered_things_keep_their_contract(kind, name, thing):
     found = list(check_thing(kind, name, thing))
     assert failures(found) == []
@@ -67,11 +67,6 @@ def test_every_effect_keeps_its_contract(plant):
     points = {f.name.split(" on ")[0].split(" in ")[0] for name, f in found if name == effects[0].name}
     assert points >= {"binds", "null values", "documented", "printed", "null law", "acts", "responds", "finite",
                       "deterministic", "compiled"}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", COMPOSED)
-def test_composed_identifiers_keep_their_contract(name):
-    assert failures(check_identifier(identifier_of(name, IDENTIFIERS))) == []
 
 
 OWN = [n for n, i in IDENTIFIERS.items() if not i.package]

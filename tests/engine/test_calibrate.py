@@ -25,7 +25,9 @@ def test_probes_fill_the_box_and_what_cannot_be_reached_is_said(arm: Model) -> N
     assert not calibrate(axis, coarse, np.array([[1.0]]), "fine").reached
 
 
-def test_a_finer_accuracy_takes_more_steps_and_errors_are_honest(arm, manoeuvres):
+def test_a_finer_accuracy_takes_more_steps_errors_are_honest_and_a_long_record_is_cut_in_parts(
+    arm, manoeuvres, monkeypatch
+):
     """Within a factor of two of the difference to a much finer run."""
     spread = probes(*box_of(arm))
     standard, fine = (calibrate(arm, manoeuvres["empty"], spread, a, spans=False) for a in ("standard", "fine"))
@@ -33,10 +35,6 @@ def test_a_finer_accuracy_takes_more_steps_and_errors_are_honest(arm, manoeuvres
     assert (standard.reached, fine.reached, fine.error < standard.error) == (True, True, True)
     run, finest = (simulate(arm, manoeuvres["empty"], spread, s).output for s in (standard.schedule, Schedule(24)))
     assert 0.5 <= standard.error / np.abs(run - finest).max() <= 2.0
-
-
-def test_a_long_record_is_calibrated_in_parts(arm, manoeuvres, monkeypatch):
-    spread = probes(*box_of(arm))
     whole = calibrate(arm, manoeuvres["lower"], spread, spans=False)
     monkeypatch.setattr(import_module("armid.engine.calibrate"), "MOST_OF_PROBES", 1000)
     parts = calibrate(arm, manoeuvres["lower"], spread)

@@ -207,11 +207,22 @@ def using(wide: Model, plain: Array, name: str, share: float = 0.3) -> Array:
 
 
 @pytest.mark.slow
-def test_a_small_model_evaluates_every_effect(arm: Model, wide: Model) -> None:
+def test_a_small_model_evaluates_every_effect_and_the_motion_is_that_without_what_is_inactive(
+    arm: Model, wide: Model, rubbing_arm, manoeuvres, unweighted
+) -> None:
     assert len(NAMES) == FEWEST_IDLE
     least = Model(arm.plant, tuple(EFFECTS[n] for n in NAMES))
     assert not strengths_of(Model(arm.plant, least.effects[1:]))
     assert set(strengths_of(least)) == set(NAMES) < set(strengths_of(wide))
+    # The plant alone, and with two effects, few enough that both are evaluated.
+    # A delay of 0 switches at once, and behind a switch no step is long: only even steps are the same.
+    even = replace(unweighted, plan=None)
+    for name, small in (("", arm), ("coulomb", rubbing_arm), ("viscous", rubbing_arm)):
+        candidate = using(wide, drawn(arm, 1, 8)[0], name)
+        values = dict(zip(wide.parameters, candidate))
+        expected = simulate(small, manoeuvres["lower"], [values[n] for n in small.parameters], even).output
+        found = simulate(wide, manoeuvres["lower"], candidate, even).output
+        np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12)
 
 
 @pytest.mark.slow
@@ -226,16 +237,3 @@ def test_neighbours_that_use_other_effects_change_nothing(arm, wide, manoeuvres,
     candidate = using(wide, plain, "")
     candidate[list(wide.parameters).index("viscous.slope")] = np.nan
     assert simulate(wide, manoeuvres["lower"], candidate, unweighted).failed.all()
-
-
-@pytest.mark.slow
-def test_the_motion_is_that_of_the_model_without_what_is_inactive(arm, rubbing_arm, wide, manoeuvres, unweighted):
-    """The plant alone, and with two effects, few enough that both are evaluated."""
-    # A delay of 0 switches at once, and behind a switch no step is long: only even steps are the same.
-    even = replace(unweighted, plan=None)
-    for name, small in (("", arm), ("coulomb", rubbing_arm), ("viscous", rubbing_arm)):
-        candidate = using(wide, drawn(arm, 1, 8)[0], name)
-        values = dict(zip(wide.parameters, candidate))
-        expected = simulate(small, manoeuvres["lower"], [values[n] for n in small.parameters], even).output
-        found = simulate(wide, manoeuvres["lower"], candidate, even).output
-        np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12)

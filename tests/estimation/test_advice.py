@@ -173,13 +173,9 @@ def test_advice_on_the_arm(rivals):
     assert advice[0].words != "lower.csv once more"
 
 
-@pytest.fixture(scope="module")
-def some(rivals):
+def test_a_louder_sensor_tells_less_apart_and_twins_nothing_does(rivals):
     (replay,) = rivals[0].records.replays
-    return manoeuvre_grid(replay.model, [replay.record])[5::30]
-
-
-def test_a_louder_sensor_tells_less_apart_and_twins_nothing_does(rivals, some):
+    some = manoeuvre_grid(replay.model, [replay.record])[5::30]
     with pytest.raises(ArmidError, match="1 model was given: at least two are expected"):
         advise(rivals[:1], whitening(rivals))
     twin = replace(rivals[1], name="twin")

@@ -31,7 +31,7 @@ class Linear:
         return np.zeros(len(self.jacobian)), self.jacobian
 
 
-def test_the_interval_counts_what_is_not_known_as_a_joint_estimate_does():
+def test_the_interval_counts_what_is_not_known_jointly_and_common_factors_are_told():
     rng = np.random.default_rng(1)
     jacobian, doubts = rng.normal(size=(50, 2)), rng.normal(size=(50, 3))
     found = information_of(Linear(jacobian), np.array([0.5, 0.5]), None, doubts)
@@ -40,9 +40,6 @@ def test_the_interval_counts_what_is_not_known_as_a_joint_estimate_does():
     assert found.deviation == pytest.approx(np.sqrt(np.diag(joint)[:2]) * Linear.span)
     without = information_of(Linear(jacobian), np.array([0.5, 0.5]), None, columns_of((), 50))
     assert (without.deviation < found.deviation).all()
-
-
-def test_what_is_known_up_to_a_common_factor_is_told():
     rng = np.random.default_rng(2)
     a, b, c, d = rng.normal(size=(4, 40))
     slopes = np.column_stack([a, b, c])

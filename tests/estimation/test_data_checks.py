@@ -104,16 +104,6 @@ def late(seconds, *files):
     return change("time_s", lambda t: np.round(t + seconds, 6), *files)
 
 
-def sparse(*files):
-    """Return a mistake that is none: records of another rate."""
-
-    def made(folder):
-        for file in files:
-            write_table(folder / file, {n: v[::10] for n, v in read_table(folder / file, file).columns.items()})
-
-    return made
-
-
 def noise(*files):
     return change(SPEED, lambda x: np.random.default_rng(5).normal(0, 20, x.size), *files)
 
@@ -141,10 +131,6 @@ def constant(text):
     return toml(("gyro_range_deg_s = 200", f"gyro_range_deg_s = 200\nconstants = {{ {text} }}"))
 
 
-def bounds(text):
-    return toml(more=f"\n[parameters]\n{text}\n")
-
-
 # Of the strokes at 1 kHz every so many-th sample is kept: a mistake shows in them as well, in half of the time.
 EVERY = 4
 NO_RANGE, ONE = toml(("gyro_range_deg_s = 200\n", "")), ("lower.csv",)
@@ -170,7 +156,8 @@ MISTAKES: dict[str, tuple[str, tuple[Callable[[Path], None], ...], str]] = {
     "same record held out": ("arm", (copied("raise.csv", "again.csv", "holdout"),), "raise.*again.*same 301 samples"),
     "g < 0": ("arm", (constant("g = -9.81"),), "'g' is -9.81 m/s2, a value from 0 to 30"),
     "milliohm": ("arm", (constant("R = 400.0"),), "'R' is 400 ohm"),
-    "MPa": ("arm", (bounds("p0 = { low = 2.6, high = 3.5 }"),), "p0: 2.6 to 3.5 is far outside the declared range"),
+    "MPa": ("arm", (toml(more="\n[parameters]\np0 = { low = 2.6, high = 3.5 }\n"),),
+            "p0: 2.6 to 3.5 is far outside the declared range"),
     "drive inverted": ("axis", (change("drive_N_m", np.negative, *AXIS),), "'u'.*sign looks inverted"),
     "drive inverted once": ("axis", (change("drive_N_m", np.negative, "fast.csv"),),
                             r"fast\.csv.*'u'.*sign.*disagree: one of the two is wrong"),
@@ -225,7 +212,7 @@ def accusations(said: list[str]) -> list[str]:
 def test_a_clock_is_moved_by_a_time_and_not_by_samples(campaign):
     """A record of few samples of which hardly any would be left stays as it is."""
     folder = campaign("arm")
-    sparse("raise.csv")(folder)
+    rewritten(lambda columns: {n: v[::10] for n, v in columns.items()}, "raise.csv")(folder)
     records = [r for r in read_campaign(folder).train if r.file in ("lower.csv", "raise.csv")]
     left = [moved(r, 0.2) for r in records]
     lost = [(r.n_samples - m.n_samples) * r.manoeuvre.interval for r, m in zip(records, left, strict=True)]
@@ -265,7 +252,9 @@ def test_right_campaigns_are_not_accused(root, stand, tmp_path):
     options += [tuple(text.split(" ")) for text in SENSORS]
     options += [("--repeats", "1", "--holdout", "", "--seed", str(4100 + i), "--manoeuvres", PAIRS[i % len(PAIRS)],
                  "--effect", *effects.split()) for i, effects in enumerate(LACKING[::3])]  # fmt: skip
-    folders = [stand(*words) for words in options] + [root / "studies" / "campaigns" / name for name in COMMITTED]
+    folders = [stand("--duration", "0.8", *words) for words in options] + [
+        root / "studies" / "campaigns" / name for name in COMMITTED
+    ]
     folders += [pendulum(tmp_path / f"p{i}", i, friction) for i, friction in enumerate((0.0, 0.03, 0.1))]
     shutil.copytree(root / "studies" / "campaigns" / "paper_arm", tmp_path / "arm")
     folders += [halves(pendulum(tmp_path / "parts"), ("window_s = [0, 1.5]", "window_s = [1.6, 3]")),

@@ -62,13 +62,18 @@ def test_three_phases_the_budget_that_an_early_end_leaves_and_a_swarm_with_the_i
     np.testing.assert_array_equal(asked_of(problem)[0][:64], asked_of(alone)[0])
 
 
-def test_capabilities_of_the_composed_are_those_of_their_parts() -> None:
+def test_capabilities_of_the_composed_are_those_of_their_parts_and_options_reach_these() -> None:
     chain = identifier("random+multistart:least_squares+lbfgs")
     assert (chain.is_global, chain.uses_gradient, chain.is_stochastic, chain.needs_residuals) == (True,) * 4
     local = identifier("bobyqa+nelder_mead")
     assert (local.is_global, local.uses_gradient, local.needs_residuals) == (False,) * 3
     assert identifier("multistart:bobyqa").is_global
     assert identifier_of("pso", OWN) is IDENTIFIERS["pso"]
+    for name in ("multistart:bobyqa", "random+multistart:bobyqa"):
+        few, many = Bowl(), Bowl()
+        ran(name, few, 200, **{"bobyqa.tolerance": 0.0})
+        ran(name, many, 200, **{"bobyqa.tolerance": 0.02})
+        assert jumps(many) > jumps(few) + 3
 
 
 @pytest.mark.parametrize("name", ["evolution+bobyqa", "evolution+mine", "pso+mine+bobyqa", "multistart:mine",
@@ -82,14 +87,6 @@ def test_a_user_s_own_takes_part(name: str) -> None:
     assert f.min() < f[:100].min()
     if name == "evolution+mine":
         np.testing.assert_allclose(asked[200], asked[np.argmin(f[:200])], rtol=1e-12)
-
-
-def test_options_reach_the_local_one_of_a_multistart_also_in_a_chain() -> None:
-    for name in ("multistart:bobyqa", "random+multistart:bobyqa"):
-        few, many = Bowl(), Bowl()
-        ran(name, few, 200, **{"bobyqa.tolerance": 0.0})
-        ran(name, many, 200, **{"bobyqa.tolerance": 0.02})
-        assert jumps(many) > jumps(few) + 3
 
 
 def jumps(problem: Bowl) -> int:

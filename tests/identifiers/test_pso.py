@@ -83,8 +83,6 @@ def test_the_paper_s_settings_make_12000_evaluations_and_every_evaluator_gives_t
         np.testing.assert_array_equal(other.pop.get("X"), light.pop.get("X"))
         assert other.algorithm.evaluator.n_eval == light.algorithm.evaluator.n_eval == 12000
 
-
-def test_values_of_the_problem_beside_the_fitness_reach_the_individuals() -> None:
     class Talkative(Valley):
         def _evaluate(self, x: Array, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
             super()._evaluate(x, out, *args, **kwargs)

@@ -164,18 +164,15 @@ def wrapping(value: Any, low: Any, high: Any) -> None:
         raise RuntimeError("in the library") from error
 
 
-def test_an_error_that_a_library_wraps_comes_out_and_a_failure_stays_finite() -> None:
+def test_an_error_that_a_library_wraps_comes_out_and_a_package_that_is_missing_is_named() -> None:
     meter, _ = run(as_identifier("wrapping", wrapping), 1)
     assert meter.used == 403
     with pytest.raises(RuntimeError, match="in the library"):
         run(as_identifier("wrapping", wrapping), 1, Trial(Meter(403), holes=True))
+    with pytest.raises(ArmidError, match="'absent' needs the package no_such_package, which is not installed"):
+        declared("absent", "", Absent, "LN_BOBYQA").build(100)
 
 
 @dataclass(frozen=True)
 class Absent(ByValues):
     package = "no_such_package"
-
-
-def test_a_package_that_is_missing_is_named() -> None:
-    with pytest.raises(ArmidError, match="'absent' needs the package no_such_package, which is not installed"):
-        declared("absent", "", Absent, "LN_BOBYQA").build(100)

@@ -45,16 +45,13 @@ def compared(tree, kind):
             yield from (part for part in ast.walk(node) if isinstance(part, kind))
 
 
-def test_no_other_constant_decides():
+def test_no_other_constant_and_no_plain_number_decides():
     known = {name for names in NUMERICS.values() for name in names}
     trees = {file: ast.parse(file.read_text()) for file in FILES if file.name != "decisions.py"}
     mine = {name for tree in trees.values() for name in numbers_of(tree) if name.isupper()}
     used = {part.id for tree in trees.values() for part in compared(tree, ast.Name)}
     assert mine & used <= known
     assert known <= used, "a name of the list is compared with nowhere"
-
-
-def test_no_plain_number_decides():
     for file in FILES:
         for part in compared(ast.parse(file.read_text()), ast.Constant):
             if isinstance(part.value, (int, float)) and not isinstance(part.value, bool):

@@ -78,16 +78,13 @@ def test_forecasts_of_columns_together_of_sides_of_what_unknowns_can_do_and_of_t
     assert scale.reach(scale.log_likelihood(321.0)) == pytest.approx(321.0)
 
 
-def test_unknowns_that_are_projected_out_are_those_of_a_joint_fit():
+def test_unknowns_that_are_projected_out_are_those_of_a_joint_fit_and_prior_odds_are_shared_out():
     """min over z of the projected problem is min over z and v of |r - C v|^2 + |v|^2."""
     columns, residual = RNG.normal(size=(N, 3)), RNG.normal(size=N)
     white = Cover.of(columns).white(residual)
     best = np.linalg.solve(np.eye(3) + columns.T @ columns, columns.T @ residual)
     left = residual - columns @ best
     assert white @ white == pytest.approx(left @ left + best @ best)
-
-
-def test_prior_odds_are_shared_out():
     beliefs = Calibration(1.0, {"effect": 0.7}, {"coulomb": 4.0})
     odds = (0.7 / 36) / (1 - 0.7 / 36)
     assert np.exp(beliefs.log_odds("effect", 36)) == pytest.approx(odds)

@@ -14,7 +14,7 @@ def simulate(meter: Meter, fitness: list[float], failed: list[bool] | None = Non
     meter.record([[i, f] for i, f in enumerate(fitness)], fitness, failed)
 
 
-def test_grants_exactly_the_budget() -> None:
+def test_grants_exactly_the_budget_and_the_log_holds_everything_in_order() -> None:
     meter = Meter(10)
     assert [meter.grant(n) for n in (3, 3, 20, 0, -1)] == [3, 3, 10, 0, 0]
     for asked, granted in ((4, 4), (4, 4), (4, 2), (4, 0)):
@@ -23,6 +23,20 @@ def test_grants_exactly_the_budget() -> None:
     assert (meter.used, meter.left, meter.exhausted) == (10, 0, True)
     with pytest.raises(ValueError, match="1 simulations were made, the budget allowed 0"):
         simulate(meter, [1.0])
+    rng = np.random.default_rng(1)
+    x, f, failed = rng.random((5000, 3)), rng.random(5000), rng.random(5000) < 0.1
+    meter, start = Meter(5000), 0
+    while meter.left:
+        end = start + meter.grant(int(rng.integers(0, 700)))
+        meter.record(x[start:end], f[start:end, np.newaxis], failed[start:end])
+        start = end
+    log = meter.log()
+    np.testing.assert_array_equal(log.X, x)
+    np.testing.assert_array_equal(log.F, f)
+    np.testing.assert_array_equal(log.failed, failed)
+    assert meter.best_f == f[~failed].min()
+    with pytest.raises(ValueError, match="read-only"):
+        log.F[0] = 0.0
 
 
 def test_keeps_each_improvement_and_the_best_which_is_neither_nan_nor_failed() -> None:
@@ -44,23 +58,6 @@ def test_keeps_each_improvement_and_the_best_which_is_neither_nan_nor_failed() -
     simulate(meter, [np.nan, 0.5, 0.2, np.nan], [True, False, True, False])
     assert (meter.best_f, meter.reached, meter.n_failed, meter.used) == (0.5, True, 3, 7)
     assert meter.trace().evaluation.tolist() == [5]
-
-
-def test_the_log_holds_everything_in_order() -> None:
-    rng = np.random.default_rng(1)
-    x, f, failed = rng.random((5000, 3)), rng.random(5000), rng.random(5000) < 0.1
-    meter, start = Meter(5000), 0
-    while meter.left:
-        end = start + meter.grant(int(rng.integers(0, 700)))
-        meter.record(x[start:end], f[start:end, np.newaxis], failed[start:end])
-        start = end
-    log = meter.log()
-    np.testing.assert_array_equal(log.X, x)
-    np.testing.assert_array_equal(log.F, f)
-    np.testing.assert_array_equal(log.failed, failed)
-    assert meter.best_f == f[~failed].min()
-    with pytest.raises(ValueError, match="read-only"):
-        log.F[0] = 0.0
 
 
 def test_refuses_what_does_not_match() -> None:

@@ -49,11 +49,6 @@ class Counted:
         return getattr(self.ready, name)
 
 
-@pytest.fixture
-def problem(arm_space, lowering_replays):
-    return IdentificationProblem(arm_space, lowering_replays, FITNESS["rmse"])
-
-
 def test_says_what_its_columns_are_and_wants_a_free_parameter_and_a_record(arm_space, lowering_replays):
     some = IdentificationProblem(arm_space.with_fixed("k", 1.0), lowering_replays, FITNESS["rmse"])
     assert (some.names, some.units) == (("p0", "eta3", "n"), ("Pa", "1", "1"))
@@ -129,7 +124,8 @@ def test_a_deep_copy_shares_records_and_meter(arm_space, lowering_replays):
     assert result.history[0].problem.replays is problem.replays
 
 
-def test_a_population_in_parts_gives_the_same_bits(problem, monkeypatch):
+def test_a_population_in_parts_gives_the_same_bits(arm_space, lowering_replays, monkeypatch):
+    problem = IdentificationProblem(arm_space, lowering_replays, FITNESS["rmse"])
     X = np.random.default_rng(3).uniform(problem.xl, problem.xu, (37, 4))
     whole = problem.value(X)
     seen = []

@@ -124,15 +124,10 @@ def test_agrees_with_the_literal_equations(kind: str) -> None:
             agree(x, rows, *(float(rng.choice(values)) for values in options))
 
 
-@pytest.fixture(scope="module")
-def trajectories() -> Array:
+def test_agrees_with_the_literal_equations_on_the_arm() -> None:
     """Angular velocities [rad/s] of the reference arm at 1 kHz, the first 0.7 s."""
-    files = sorted(REFERENCE.glob("trajectory_*.csv"))
-    return np.array([np.loadtxt(file, delimiter=",", skiprows=1, usecols=2)[:701] for file in files])
-
-
-def test_agrees_with_the_literal_equations_on_the_arm(trajectories: Array) -> None:
-    rng = np.random.default_rng(1)
+    files, rng = sorted(REFERENCE.glob("trajectory_*.csv")), np.random.default_rng(1)
+    trajectories = np.array([np.loadtxt(file, delimiter=",", skiprows=1, usecols=2)[:701] for file in files])
     assert len(trajectories) == 14
     gyro = np.deg2rad(0.15)
     for x in trajectories[:7]:

@@ -52,7 +52,7 @@ def test_every_problem_is_what_version_1_declares():
     assert hashlib.sha256("\n".join(lines).encode()).hexdigest()[:16] == "d012508c95671a16"
 
 
-def test_the_suite_is_a_lazy_sequence():
+def test_the_suite_is_a_lazy_sequence_and_what_is_hard_is_measured():
     suite = armid.suite()
     assert len(suite) == 15 * len(DEFINITIONS) >= 360
     assert [p.name for p in suite[:16]][-2:] == ["arm/15", "arm_noisy/1"]
@@ -63,6 +63,12 @@ def test_the_suite_is_a_lazy_sequence():
     for wrong in (lambda: suite["am/1"], lambda: armid.suite("two"), lambda: armid.suite(units="box ")):
         with pytest.raises(ArmidError, match=r"is not in the suite|known:|mean"):
             wrong()
+    arm, shape = armid.suite()["arm/1"], armid.suite()["arm_shape/1"]
+    assert arm.difficulty == "smooth"
+    assert arm.landscape["minima"] == 1.0
+    assert shape.difficulty == "stair"
+    assert shape.landscape["stair"] > 0.9
+    assert {measure for _, measure, _ in CLASSES_OF_FORMS} < set(arm.landscape)
 
 
 def test_making_the_suite_compiles_nothing(tmp_path):
@@ -112,15 +118,6 @@ def test_a_call_takes_a_vector_or_an_array_in_either_unit_and_gives_one_objectiv
     assert problem(u[0]).shape == (4,)
     # records of the same length: the whole is the root of the mean square
     np.testing.assert_allclose(np.sqrt((problem(u) ** 2).mean(axis=1)), joined(u), rtol=1e-12)
-
-
-def test_what_is_hard_is_measured():
-    arm, shape = armid.suite()["arm/1"], armid.suite()["arm_shape/1"]
-    assert arm.difficulty == "smooth"
-    assert arm.landscape["minima"] == 1.0
-    assert shape.difficulty == "stair"
-    assert shape.landscape["stair"] > 0.9
-    assert {measure for _, measure, _ in CLASSES_OF_FORMS} < set(arm.landscape)
 
 
 def test_a_campaign_is_a_problem_on_top(paper_arm, paper_arm_folder):

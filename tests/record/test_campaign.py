@@ -88,6 +88,13 @@ def test_constants_are_laid_over_each_other(write_two):
     assert (first.constants["shell"], second.constants["shell"]) == (1.0, 0.0)
     assert second.constants["theta_C"] == pytest.approx(-40 * DEGREE)
     assert first.pieces[0].manoeuvre.constants == first.constants
+    hum = Effect("hum", (Parameter("size", "effort", 0.0, 0.1, null=0.0),), {"torque": lambda size: size})
+    folder = write_two(top="[parameters.hum.size]\nhigh = 4.0")
+    with pytest.raises(ArmidError, match=r"hum\.size"):
+        read_campaign(folder)
+    assert read_campaign(folder, effects={**EFFECTS, "hum": hum}).parameters["hum.size"].high == 4.0
+    with pytest.raises(ArmidError, match="shell_transfer_arm"):
+        read_campaign(folder, plants={"driven_axis": PLANTS["driven_axis"]})
 
 
 @pytest.mark.parametrize("text", [
@@ -98,16 +105,6 @@ def test_constants_are_laid_over_each_other(write_two):
 def test_parameters_by_either_spelling(write_two, text):
     campaign = read_campaign(write_two(top=text))
     assert campaign.parameters == {"p0": Override(low=2.9e6, high=3.2e6), "coulomb.width": Override(fixed=0.01)}
-
-
-def test_own_plants_and_effects_can_be_named(write_two):
-    hum = Effect("hum", (Parameter("size", "effort", 0.0, 0.1, null=0.0),), {"torque": lambda size: size})
-    folder = write_two(top="[parameters.hum.size]\nhigh = 4.0")
-    with pytest.raises(ArmidError, match=r"hum\.size"):
-        read_campaign(folder)
-    assert read_campaign(folder, effects={**EFFECTS, "hum": hum}).parameters["hum.size"].high == 4.0
-    with pytest.raises(ArmidError, match="shell_transfer_arm"):
-        read_campaign(folder, plants={"driven_axis": PLANTS["driven_axis"]})
 
 
 @pytest.mark.parametrize("encode", [

@@ -34,7 +34,7 @@ def test_a_line_is_smoothed_over_the_longest_window_and_a_kink_ends_it():
     assert np.sqrt(np.mean(np.square(errors))) < 0.02
 
 
-def test_a_machine_at_rest_starts_at_rest():
+def test_a_machine_at_rest_starts_at_rest_and_the_deviation_is_honest():
     """While no input changes and the signal stands still its slope is 0; a motion under a still input keeps its own."""
     rng, rest = np.random.default_rng(6), 60
     begun = np.concatenate([np.zeros(rest), MOTION[:400]]) + rng.normal(0.0, 0.1, rest + 400)
@@ -46,10 +46,7 @@ def test_a_machine_at_rest_starts_at_rest():
     assert abs(smoothed(begun, 0, 0.1, still=rest)[0]) < 3.0 * 0.1 / np.sqrt(rest)
     moving = 3.0 * TIMES[:rest] + rng.normal(0.0, 0.01, rest)
     assert smoothed(moving, 0, 0.01, slope=True, still=rest)[0] == pytest.approx(3.0 / 500, rel=0.1)
-
-
-def test_the_deviation_is_honest():
-    """Over 300 noises on a motion that turns and jerks, errors are as large as they are said to be."""
+    # Over 300 noises on a motion that turns and jerks, errors are as large as they are said to be.
     for noise, index in ((1e-3, 0), (1e-3, 700), (1e-2, 333), (0.1, 0), (0.1, 333)):
         rng = np.random.default_rng(2)
         found = [smoothed(MOTION + rng.normal(0.0, noise, TIMES.size), index, noise) for _ in range(300)]

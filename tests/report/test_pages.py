@@ -192,7 +192,7 @@ def test_nothing_is_fetched_only_the_page_s_own_script_runs_and_many_records_mak
     assert len(html(loop_document(loop_report(), details, {}, "x"))) < 0.9e6
 
 
-def test_a_study_gives_its_answer_state_tables_and_file(capsys):
+def test_a_study_gives_its_answer_state_tables_and_file_and_columns_and_intervals_as_they_are(capsys):
     document = study_document()
     page = Elements(html(document))
     for wanted in ("Is made_up right?", "Yes, made_up.", "Complete: 4 of 4 runs.", "Words of made_up.",
@@ -203,6 +203,15 @@ def test_a_study_gives_its_answer_state_tables_and_file(capsys):
     shown = printed(document, capsys)
     assert "identifier: made_up b" in shown
     assert "Words of made_up." in shown
+    rows = [("mass", "kg", "2.5", "a", ""), ("level", "N", "", "a", ""), ("slope", "N s/m", "", "a", "")]
+    columns, cells, note = varying(table("Parameters", ["name", "unit", "before", "said", "empty"], rows))
+    assert [c.key for c in columns] == ["name", "unit", "before"]
+    assert [[c.text for c in row] for row in cells] == [list(row[:3]) for row in rows]
+    assert note == "In every line said is a."
+    # an interval is shown with digits that tell its ends apart
+    for ends in (("0.0118", "0.011", "0.013"), ("0.01180006", "0.01179978", "0.01180033")):
+        shown = dict(zip(("value", "low", "high"), map(float, ends), strict=True), unit="kg m2", interval_holds=True)
+        assert value_text(shown) == "{} kg m2 ({} to {})".format(*ends)
 
 
 @pytest.mark.parametrize(("names", "said"), [
@@ -310,19 +319,3 @@ def test_few_points_rising_with_both_ends_and_the_extremes(n, most, seed):
         assert values[kept].max() == values.max()
     if n <= most:
         assert len(kept) == n
-
-
-def test_a_column_that_is_empty_in_some_lines_is_not_told_as_the_same_in_all():
-    rows = [("mass", "kg", "2.5", "a", ""), ("level", "N", "", "a", ""), ("slope", "N s/m", "", "a", "")]
-    columns, cells, note = varying(table("Parameters", ["name", "unit", "before", "said", "empty"], rows))
-    assert [c.key for c in columns] == ["name", "unit", "before"]
-    assert [[c.text for c in row] for row in cells] == [list(row[:3]) for row in rows]
-    assert note == "In every line said is a."
-
-
-@pytest.mark.parametrize(("value", "low", "high", "text"), [
-    (0.0118, 0.011, 0.013, "0.0118 kg m2 (0.011 to 0.013)"),
-    (0.01180006, 0.01179978, 0.01180033, "0.01180006 kg m2 (0.01179978 to 0.01180033)"),
-])  # fmt: skip
-def test_an_interval_is_shown_with_digits_that_tell_its_ends_apart(value, low, high, text):
-    assert value_text({"unit": "kg m2", "value": value, "low": low, "high": high, "interval_holds": True}) == text

@@ -57,7 +57,7 @@ def key_of(folder: Path) -> dict[str, Any]:
     return dict(json.loads(key_path(folder).read_text()))
 
 
-def test_the_suite_holds_what_the_question_asks() -> None:
+def test_the_suite_holds_what_the_question_asks_and_a_part_the_campaigns_of_the_whole() -> None:
     suite = read_suite(SUITE)
     cases = cases_of(suite, 1)
     counts = Counter(case.label for case in cases)
@@ -69,10 +69,6 @@ def test_the_suite_holds_what_the_question_asks() -> None:
     assert not {kind.name for kind in suite.unlisted} & LISTED
     for label in ("control", "single", "two", "unlisted"):
         assert Counter(case.coloured for case in cases if case.label == label)[True] * 2 == counts[label]
-
-
-def test_campaigns_of_a_part_are_those_of_the_whole() -> None:
-    cases = cases_of(read_suite(SUITE), 1)
     part = shuffled(cases, 1, ["coulomb"])
     assert {case.index for case in part.values()} == {case.index for case in cases if case.chosen(["coulomb"])}
     assert list(part) == [f"c{count:03d}" for count in range(len(part))]

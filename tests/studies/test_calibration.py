@@ -28,7 +28,8 @@ def test_a_study_that_is_cut_short_has_seen_all_families_alike():
     assert (hidden.name, hidden.campaign) == ("hidden_000", "one_000")
 
 
-def test_names_that_nobody_can_tell_apart_share_their_truth():
+def test_names_that_nobody_can_tell_apart_share_their_truth_and_versions_are_compared_on_it():
+    truth = truth_of(ENTRY, hidden=False)
     truth = truth_of(ENTRY, hidden=False)
     assert truth.exact
     assert truth.holds("output_lag")
@@ -39,6 +40,15 @@ def test_names_that_nobody_can_tell_apart_share_their_truth():
     # an effect of no library is named by nobody
     assert not all_found(truth, [frozenset({"drive_lag"})], 4)
     assert not truth_of(ENTRY, hidden=True).holds("drive_lag")
+
+    def answer(low, high, cpu_s):
+        return {"parameters": {"after": {"mass": {"value": 2.0, "low": low, "high": high}}}, "cpu_s": cpu_s}
+
+    mine, its = answer(1.9, 2.1, 10.0), answer(2.0, 2.4, 5.0)
+    both = Closed("one_000", "one", "arm", "arm", truth, ENTRY, mine, its)
+    assert both.beside_former() == [(pytest.approx(0.1), pytest.approx(0.2))]
+    assert ratio_of(median)(both.times_beside_former()) == 2.0
+    assert Closed("one_001", "one", "arm", "arm", truth, ENTRY, mine).beside_former() == []
 
 
 def test_errors_of_probabilities_costs_of_intervals_and_targets_by_hand():
@@ -58,18 +68,6 @@ def test_errors_of_probabilities_costs_of_intervals_and_targets_by_hand():
     assert Score("S2", "made up", "arm", 20, 0.5, 0.4, 0.6).met is None
     # all alike: the rule of three
     assert score("S2", "made up", "arm", [[True]] * 30, lambda one: one).low == pytest.approx(0.9)
-
-
-def test_both_versions_are_compared_on_the_campaigns_that_both_closed():
-    def answer(low, high, cpu_s):
-        return {"parameters": {"after": {"mass": {"value": 2.0, "low": low, "high": high}}}, "cpu_s": cpu_s}
-
-    mine, its = answer(1.9, 2.1, 10.0), answer(2.0, 2.4, 5.0)
-    truth = truth_of(ENTRY, hidden=False)
-    both = Closed("one_000", "one", "arm", "arm", truth, ENTRY, mine, its)
-    assert both.beside_former() == [(pytest.approx(0.1), pytest.approx(0.2))]
-    assert ratio_of(median)(both.times_beside_former()) == 2.0
-    assert Closed("one_001", "one", "arm", "arm", truth, ENTRY, mine).beside_former() == []
 
 
 @pytest.mark.slow

@@ -27,24 +27,20 @@ def states(count: int = 200) -> list[dict[str, float]]:
 
 
 @pytest.mark.parametrize("name", ["lower", "raise"])
-@pytest.mark.parametrize(
-    ("one", "other"),
-    [
-        ({"seal_friction": 300.0, "seal_width": 0.004},
-         {"coulomb": 300.0 * LEVER, "coulomb_width": 0.004, "coulomb_tanh": 1.0}),
-        ({"asymmetric_friction": 40.0, "asymmetric_share": 0.0},
-         {"coulomb": 40.0, "coulomb_width": 0.002, "coulomb_tanh": 1.0}),
-        ({"worm_braking": 1.0},
-         {"worm_loss": 1.0 - (2.0 - 1.0 / 0.55) / 0.55, "worm_width": 0.002, "worm_tanh": 1.0}),
-        ({"piston_stiction": 500.0, "stiction_fade_deg": 1e9}, {"seal_friction": 500.0}),
-        ({"cam_bump": 30.0, "cam_width_deg": 1e6}, {"seal_friction": 30.0 / LEVER}),
-        ({"sway": 20.0, "sway_hz": 1e-9, "sway_phase_deg": 90.0}, {"torque_offset": 20.0}),
-        ({"rocking_hz": 8.0, "rocking_stop": 1e3}, {"rocking_hz": 8.0}),
-        ({"base_compliance": 1e-4, "base_hz": 1e-3}, {}),
-        ({"drive_compliance": 5e-11, "drive_damping": 3e5}, {}),
-    ],
-    ids=lambda told: next(iter(told), "declared"),
-)  # fmt: skip
+@pytest.mark.parametrize(("one", "other"), [
+    ({"seal_friction": 300.0, "seal_width": 0.004},
+     {"coulomb": 300.0 * LEVER, "coulomb_width": 0.004, "coulomb_tanh": 1.0}),
+    ({"asymmetric_friction": 40.0, "asymmetric_share": 0.0},
+     {"coulomb": 40.0, "coulomb_width": 0.002, "coulomb_tanh": 1.0}),
+    ({"worm_braking": 1.0},
+     {"worm_loss": 1.0 - (2.0 - 1.0 / 0.55) / 0.55, "worm_width": 0.002, "worm_tanh": 1.0}),
+    ({"piston_stiction": 500.0, "stiction_fade_deg": 1e9}, {"seal_friction": 500.0}),
+    ({"cam_bump": 30.0, "cam_width_deg": 1e6}, {"seal_friction": 30.0 / LEVER}),
+    ({"sway": 20.0, "sway_hz": 1e-9, "sway_phase_deg": 90.0}, {"torque_offset": 20.0}),
+    ({"rocking_hz": 8.0, "rocking_stop": 1e3}, {"rocking_hz": 8.0}),
+    ({"base_compliance": 1e-4, "base_hz": 1e-3}, {}),
+    ({"drive_compliance": 5e-11, "drive_damping": 3e5}, {}),
+], ids=lambda told: next(iter(told), "declared"))  # fmt: skip
 @pytest.mark.slow
 def test_two_ways_to_say_the_same_agree(one: dict[str, float], other: dict[str, float], name: str) -> None:
     assert np.abs(moved(Effects(**one), name).gyro - moved(Effects(**other), name).gyro).max() < 1e-5

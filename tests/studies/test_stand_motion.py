@@ -56,9 +56,6 @@ def test_a_record_that_ends_before_the_switch_has_none_and_no_shell_does_not_roc
     assert short.switch_s is None
     assert np.abs(short.gyro - moved().gyro[:301]).max() < 1e-9
     assert np.array_equal(moved(Effects(rocking_hz=10.0), "empty").gyro, moved(name="empty").gyro)
-
-
-def test_every_effect_is_tested_here() -> None:
     assert {each.name for each in fields(Effects) if "of" not in each.metadata} == set(SIZES)
 
 

@@ -165,24 +165,24 @@ def area_of(entry, options, cases, seed):
 def test_a_tuning_that_was_interrupted_ends_as_one_that_was_not(written, tmp_path, watched, capsys):
     pytest.importorskip("optuna")
     file, whole, broken = written(**SMALL), tmp_path / "whole", tmp_path / "broken"
-    command = ("tune", file, "--configurations", 4, "--jobs", 1)
+    command = ("tune", file, "--configurations", 3, "--jobs", 1)
     assert ended(*command, "--out", whole) == 0
     ran = capsys.readouterr()
-    assert "16 runs, 1,280 simulations at most in all" in ran.err
+    assert "12 runs, 960 simulations at most in all" in ran.err
     assert ran.out.startswith("of 2 identifiers ")
-    assert "16 of 16 are in " in ran.out
-    # to who watches the four rounds are one study
-    assert [(c.planned, c.done) for c in watched.started] == [(16, 0), (16, 4), (16, 8), (16, 12)]
+    assert "12 of 12 are in " in ran.out
+    # to who watches the three rounds are one study
+    assert [(c.planned, c.done) for c in watched.started] == [(12, 0), (12, 4), (12, 8)]
     made = set(watched.finished)
-    assert len(made) == len(watched.finished) == 16
+    assert len(made) == len(watched.finished) == 12
 
     watched.finished.clear()
     watched.handed.clear()
-    for watched.press_after in (6, 11):
+    for watched.press_after in (5, 9):
         assert ended(*command, "--out", broken, "--json") == 130
         assert json.loads(capsys.readouterr().out)["tuned"] == {}
         assert not (broken / "tuned.toml").exists()
-    assert 11 <= len(watched.finished) < 16
+    assert 9 <= len(watched.finished) < 12
     watched.press_after = 0
     assert ended(*command, "--out", broken, "--json") == 0
     given = json.loads(capsys.readouterr().out)
@@ -192,7 +192,7 @@ def test_a_tuning_that_was_interrupted_ends_as_one_that_was_not(written, tmp_pat
 
     tuned, first = read_study(broken / "tuned.toml"), training(read_study(file), 1)
     better = {entry.label.removesuffix(", tuned"): entry.options for entry in tuned.entries if entry.options}
-    assert better, "of four configurations none is better than the defaults"
+    assert better, "of three configurations none is better than the defaults"
     assert (tuned.name, len(tuned.entries)) == ("own_tuned", 2 + len(better))
     for entry in first.entries:
         areas, options = given["areas"][entry.label], better.get(entry.label, {})
