@@ -248,11 +248,11 @@ COMMITTED = ("four_strokes", "one_stroke", "rocking_shell", "table1_stand/row_5"
 
 @pytest.mark.slow
 def test_right_campaigns_are_not_accused(root, stand, tmp_path):
-    options = [("--repeats", "1", "--effect", *effects.split()) for effects in LACKING]
+    options = [("--repeats", "1", "--duration", "0.8", "--effect", *effects.split()) for effects in LACKING]
     options += [tuple(text.split(" ")) for text in SENSORS]
     options += [("--repeats", "1", "--holdout", "", "--seed", str(4100 + i), "--manoeuvres", PAIRS[i % len(PAIRS)],
                  "--effect", *effects.split()) for i, effects in enumerate(LACKING[::3])]  # fmt: skip
-    folders = [stand("--duration", "0.8", *words) for words in options] + [
+    folders = [stand(*words) for words in options] + [
         root / "studies" / "campaigns" / name for name in COMMITTED
     ]
     folders += [pendulum(tmp_path / f"p{i}", i, friction) for i, friction in enumerate((0.0, 0.03, 0.1))]
