@@ -48,13 +48,10 @@ def test_starting_files_of_then_and_now_pass_their_contract(kind, on, ran, tmp_p
         assert re.search(r"^(\d+) of \1 points hold$", output, re.MULTILINE)
 
 
-def test_every_kind_of_starting_file_that_is_frozen_is_still_there():
+def test_every_kind_of_starting_file_that_is_frozen_is_still_there_and_the_campaign_holds(ran):
     frozen = {path.stem.removeprefix("my_") for path in (*FROZEN.glob("my_*.py"), *FROZEN.glob("campaigns/my_*"))}
     assert len(frozen) == 5
     assert frozen <= set(NEW_KINDS)
-
-
-def test_a_starting_campaign_holds(ran):
     told = ran("check", FROZEN / "campaigns" / "my_campaign")
     assert re.search(r"^(\d+) of \1 points hold$", told, re.MULTILINE)
 

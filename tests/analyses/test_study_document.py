@@ -114,12 +114,16 @@ def test_studies_of_other_shapes(made, change, there):
     assert there <= drawn(made(cases=PAPER_CASES[:2], seeds=1, **change))
 
 
-def test_all_runs_failed(made, tmp_path):
+def test_all_runs_failed_and_names_of_a_file_make_names_of_files(made, tmp_path):
     results = made(seeds=1, noises=(0.0,), failed=15)
     assert report_of(results).answer[0] == "No run has a result."
     names = written(results, tmp_path / "out")
     assert names == ["report.md", *(f"{n}.{end}" for n in ("values", "runs", "reasons") for end in ("csv", "tex"))]
     assert "15 of them failed" in (tmp_path / "out" / "report.md").read_text()
+    results = made(seeds=1, identifiers={"a|b<script>": 1e-3, "A B": 1e-2, "a/b": 1e-2}, report="table1")
+    names = [t.name for t in report_of(results).tables]
+    assert len(set(names)) == len(names)
+    assert all(re.fullmatch(r"[a-z0-9_]+", n) for n in names)
 
 
 def test_without_a_truth_there_are_values_and_costs_and_no_errors(made):
@@ -149,13 +153,6 @@ def test_twenty_cases_have_critical_differences_and_realisations_of_noise_their_
     # seeds on one record are no noise realisations
     recorded = replace(results, runs=results.runs.assign(noise_deg_s=np.nan))
     assert "cramer_rao" not in [t.name for t in report_of(recorded).tables]
-
-
-def test_names_of_a_file_make_names_of_files(made):
-    results = made(seeds=1, identifiers={"a|b<script>": 1e-3, "A B": 1e-2, "a/b": 1e-2}, report="table1")
-    names = [t.name for t in report_of(results).tables]
-    assert len(set(names)) == len(names)
-    assert all(re.fullmatch(r"[a-z0-9_]+", n) for n in names)
 
 
 def test_the_answer_is_that_of_the_main_table(made):
@@ -203,7 +200,7 @@ def test_tables_and_figures_in_any_form():
             parts_of("mine", broken)
 
 
-def test_missing_cells_are_empty_names_of_files_differ_and_an_index_of_names_is_a_column():
+def test_missing_cells_are_empty_names_of_files_differ_and_names_of_ours_are_taken(made):
     frame = pd.DataFrame({"n": [1, None], "label": ["a", None]}).convert_dtypes()
     (section,) = own_sections({"mine": lambda runs: frame}, pd.DataFrame())
     assert [[c.text for c in row] for row in section.parts[0].cells()] == [["1", "a"], ["", ""]]
@@ -211,9 +208,6 @@ def test_missing_cells_are_empty_names_of_files_differ_and_an_index_of_names_is_
     (section,) = own_sections({"mine": lambda runs: {"A b": frame, "a_B": frame}}, pd.DataFrame())
     assert [p.name for p in section.parts] == ["own_mine_a_b", "own_mine_a_b_2"]
     assert [(c.header, c.digits) for c in section.parts[0].columns] == [("variant", ""), ("n mean", ".6g")]
-
-
-def test_names_of_ours_are_taken(made):
     assert len({a.name for a in ANALYSES}) == len(ANALYSES)
     with pytest.raises(ArmidError, match="analyses: 'ranks' is there already"):
         report_of(made(seeds=1), own={"ranks": lambda runs: None})

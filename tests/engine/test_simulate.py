@@ -60,12 +60,6 @@ def test_refused(arm: Model) -> None:
 
 
 @pytest.fixture(scope="module")
-def pushed_arm(arm: Model) -> Model:
-    """What drives it may grow with its speed: friction below 0 makes it run away."""
-    return arm + EFFECTS["viscous"]
-
-
-@pytest.fixture(scope="module")
 def schedule(schedule_for: Callable[[str, str], Schedule]) -> Schedule:
     return schedule_for("lower", "standard")
 
@@ -93,7 +87,8 @@ def test_neighbours_threads_and_weights_change_no_bit(arm, manoeuvres, schedule)
         assert same(whole, slice(None), other)
 
 
-def test_a_diverged_candidate_is_nan_from_then_on_and_harms_no_other(pushed_arm, manoeuvres):
+def test_a_diverged_candidate_is_nan_from_then_on_and_harms_no_other(manoeuvres, arm: Model):
+    pushed_arm = arm + EFFECTS["viscous"]
     calm = np.column_stack([drawn(pushed_arm, 20, 25)[:, :4], np.zeros(20)])
     wild = np.column_stack([drawn(pushed_arm, 30, 26)[:, :4], -np.geomspace(1e3, 1e7, 30)])
     order = np.random.default_rng(1).permutation(50)

@@ -17,13 +17,15 @@ from armid.model.plants.driven_axis import driven_axis
 PLANT = PLANTS["shell_transfer_arm"]
 
 
-def test_the_arm_is_declared_as_the_reference_arm() -> None:
+def test_the_arm_is_declared_as_the_reference_arm_and_a_negative_bound_warns() -> None:
     """Its constants are those of the reference trajectories of tests/engine."""
     model = Model(PLANT)
     known = {"g", "theta_C", "theta_D", "shell", "U"}
     assert all("estimate" in c.note for c in PLANT.constants if c.name not in known)
     bounds = {n: (p.low, p.high) for n, p in model.parameters.items()}
     assert bounds == {"p0": (2.6e6, 3.5e6), "k": (0.6, 1.1), "eta3": (0.45, 0.70), "n": (0.9, 1.5)}
+    with pytest.warns(UserWarning, match=r"bounds inertia = -1 to 0.02 is negative, outside the declared range"):
+        warn_if_far(PLANTS["rotary_arm"].parameters[0], [-1.0, 0.02], "bounds inertia = -1 to 0.02")
 
 
 def test_an_axis_comes_in_metres_or_radians_with_scales_of_its_own_and_a_plant_may_record_one_angle() -> None:
@@ -80,11 +82,6 @@ def test_what_is_known_roughly_is_corrected_wherever_it_stands() -> None:
     other = Manoeuvre(5e-3, 101, told | {"gravity_moment": 0.2}, motion.inputs)
     expected = [simulate(plain, m, [[j]], Schedule(8)).output[0] for m, j in ((motion, 0.1), (other, 0.125))]
     np.testing.assert_allclose(found, expected, atol=1e-12)
-
-
-def test_a_negative_bound_of_what_is_positive_warns():
-    with pytest.warns(UserWarning, match=r"bounds inertia = -1 to 0.02 is negative, outside the declared range"):
-        warn_if_far(PLANTS["rotary_arm"].parameters[0], [-1.0, 0.02], "bounds inertia = -1 to 0.02")
 
 
 TIMES = 5e-3 * np.arange(201)

@@ -45,16 +45,14 @@ def test_scales_come_from_train_records_only_and_the_hold_of_a_record_wins(write
     assert campaign.plant.scales.speed == pytest.approx(np.max(np.abs(axis_columns["velocity_m_s"])))
     assert (campaign.plant.scales.effort_unit, campaign.plant.scales.length_unit) == ("N", "m")
     assert driven_axis.scales.effort == 1.0
+    # a constant whose tolerance nobody told is taken as exact
+    for told, exact in (("", ("gain",)), ("[tolerances]\ngain = 0", ()), ("[tolerances]\ndefault = 0.02", ())):
+        toml = AXIS.format(f"[constants]\ngain = 35.0\n{told}")
+        assert read_campaign(write(toml, move=axis_columns)).taken_as_exact == exact
     toml = AXIS.format('hold = "zero"') + HOLDOUT + 'hold = "linear"\n'
     records = read_campaign(write(toml, move=axis_columns, hold=axis_columns)).records
     assert [r.manoeuvre.hold for r in records] == ["zero", "linear"]
     assert isinstance(records[0].manoeuvre, Manoeuvre)
-
-
-@pytest.mark.parametrize(("told", "exact"), [("", ("gain",)), ("[tolerances]\ngain = 0", ()),
-                                             ("[tolerances]\ndefault = 0.02", ())])  # fmt: skip
-def test_a_constant_whose_tolerance_nobody_told_is_taken_as_exact(write_axis, told, exact):
-    assert read_campaign(write_axis(toml=AXIS.format(f"[constants]\ngain = 35.0\n{told}"))).taken_as_exact == exact
 
 
 @pytest.mark.parametrize(("speed", "position", "factor"), [

@@ -83,14 +83,11 @@ def test_the_root_saturates_at_its_current_and_a_fading_motor_loses_torque_with_
     assert passed["charge"][-1] == pytest.approx(np.trapezoid(np.abs(passed["current"]), dx=1e-3), rel=1e-3)
 
 
-@pytest.mark.parametrize(("speed", "current", "expected"), [(1, 9, 0.55), (-1, -9, 0.55), (1, -9, 2 - 1 / 0.55)])
-def test_a_braking_worm_has_the_efficiency_of_the_other_direction(speed: int, current: int, expected: float) -> None:
-    now = {"angle": 0.0, "speed": float(speed), "current": float(current)}
-    assert worm_efficiency(ARM, Effects(worm_braking=1.0), now) == pytest.approx(expected)
-
-
 def test_a_self_locking_worm_passes_nothing_back_and_one_rubs_less_the_faster_it_slides() -> None:
-    now = {"angle": 0.0, "speed": 1.0, "current": -9.0}
+    # braking, it has the efficiency of the other direction
+    for speed, current, expected in ((1.0, 9.0, 0.55), (-1.0, -9.0, 0.55), (1.0, -9.0, 2.0 - 1.0 / 0.55)):
+        now = {"angle": 0.0, "speed": speed, "current": current}
+        assert worm_efficiency(ARM, Effects(worm_braking=1.0), now) == pytest.approx(expected)
     assert worm_efficiency(Arm(eta3=0.48), Effects(worm_braking=1.0), now) == pytest.approx(0.0)
     found = [relative_friction(speed) for speed in (0.0, 0.01, 0.1, 1.0, 5.0)]
     assert found[0] == pytest.approx(1.0)

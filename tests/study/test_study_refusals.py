@@ -102,7 +102,9 @@ def test_a_campaign_that_is_a_variant_or_a_link_out_of_the_folder_is_refused(wri
         read_study(file)
 
 
-def test_a_path_that_is_no_utf_8_is_refused(refused, write_study, tmp_path, monkeypatch):
+def test_a_path_that_is_no_utf_8_and_a_folder_that_cannot_be_written_are_refused(
+    refused, write_study, tmp_path, monkeypatch
+):
     """A store keeps the path as the command named it; of a whole one it keeps the name alone."""
     monkeypatch.chdir(tmp_path)
     folder = Path(os.fsdecode(b"m\xe9s"))
@@ -111,9 +113,6 @@ def test_a_path_that_is_no_utf_8_is_refused(refused, write_study, tmp_path, monk
     sentence = refused("study", folder / "small.toml", "--out", "out", "--quiet")
     assert sentence.startswith(r"armid: 'm\udce9s/small.toml' is not a name in UTF-8")
     assert not Path("out").exists()
-
-
-def test_a_folder_that_cannot_be_written_is_one_sentence(write_study, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(ArmidError, match="cannot be used: Not a directory, a folder that can be written is expected"):
         run_study(write_study(more=BOX), out=tmp_path / "file" / "out")
