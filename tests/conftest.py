@@ -233,6 +233,12 @@ def table_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def store(table_study: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of the runs of a copy of that study, for one file of tests."""
+    return shutil.copytree(table_study, tmp_path_factory.mktemp("stored") / "tiny") / "out"
+
+
 def step_response(times: Array, mass: float = 2.0, slope: float = 5.0, drive: float = 8.0) -> Array:
     """Return the speed of an axis with viscous friction under a constant drive from rest, F/c (1 - exp(-c t/m))."""
     return drive / slope * (1.0 - np.exp(-slope * times / mass))

@@ -1,4 +1,7 @@
-"""Texts that several folders of tests write into files: a lowering of the arm, the head of a blind suite, a study."""
+"""Texts that several folders of tests write into files: a lowering, the head of a blind suite, a study, any table."""
+
+import json
+from typing import Any
 
 LOWERING = """\
 [[records]]
@@ -53,3 +56,21 @@ k = [0.6, 1.1]
 eta3 = [0.45, 0.70]
 n = [0.9, 1.5]
 """
+
+
+def on_one_line(value: Any) -> str:
+    """Return a value as TOML has it on one line."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, str):
+        # JSON's escapes are TOML's, but for lone surrogates, which no UTF-8 file holds
+        return json.dumps(value.encode("utf-8", "replace").decode())
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{on_one_line(str(k))} = {on_one_line(v)}" for k, v in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(on_one_line, value)) + "]"
+    return repr(value)
+
+
+def toml_of(table: dict[str, Any]) -> bytes:
+    return "".join(f"{on_one_line(str(k))} = {on_one_line(v)}\n" for k, v in table.items()).encode()

@@ -24,6 +24,7 @@ from armid.registry import load_registry
 from armid.report.result import Result, Shown
 from armid.report.style import pyplot
 from armid.units import angles_in, scale_of
+from commands import not_drawn
 
 QUICK = {"effects": ["viscous"], "budget": 60}
 
@@ -98,7 +99,7 @@ def test_an_identifier_that_ignores_its_budget_is_stopped(axis):
     assert {p.name for p in check_thing("identifiers", "mine", Greedy) if not p.passed} == {"exact budget"}
 
 
-def test_tables_are_a_campaign(found, axis):
+def test_tables_are_a_campaign_and_read_as_their_files_would_be(found, axis):
     tables = {}
     for file, role in (("synthetic_train", "train"), ("synthetic_holdout", "holdout")):
         tables[file] = pd.read_csv(Path(axis) / f"{file}.csv")
@@ -107,9 +108,6 @@ def test_tables_are_a_campaign(found, axis):
         other = armid.identify(tables, plant=plant, effects=["viscous"], identifier="least_squares")
         np.testing.assert_allclose(other.candidate, found.candidate, rtol=1e-9)
     assert armid.simulate(tables["synthetic_train"], plant="driven_axis", inertia=0.05).campaign.train[0].file
-
-
-def test_a_table_is_read_as_its_file_would_be(axis):
     table = pd.read_csv(Path(axis) / "synthetic_train.csv").astype({"time_s": "float32", "drive_N_m": "float32"})
     table["note"], table["load_kg"] = "none yet", pd.array([pd.NA, *range(1, len(table))], dtype="Int64")
     table.attrs = {"window_s": (np.float64(0.0), 1), "constants": {"gain": np.int64(1)}}
@@ -153,7 +151,8 @@ def test_simulating_and_examining(axis, tmp_path):
 
 
 @pytest.mark.slow
-def test_closing_the_loop(axis, tmp_path):
+def test_closing_the_loop(axis, tmp_path, monkeypatch):
+    monkeypatch.setattr("armid.report.files.save", not_drawn)
     closed = armid.close_loop(axis, candidates=["viscous", EFFECTS["coulomb"]])
     assert (closed.effects, closed.to_dict()["verdict"]) == (("viscous",), "explained")
     shows(closed, tmp_path / "closed")
@@ -230,17 +229,6 @@ def test_records_come_back_in_the_unit_in_which_they_were_recorded(axis, header,
         armid.identify(recorded(axis, header, factor), units="gon", **given)
 
 
-def test_sizes_far_from_one_get_a_prefix():
-    cases = {("N m", 2e-5): "uN m", ("N m", 0.5): "N m", ("N m", 2e4): "kN m", ("s", 2e-3): "ms", ("V", 0.0): "V",
-             ("kg m2", 1e-5): "kg m2", ("1", 1e-5): "1", ("Pa", 1.0): "MPa", ("s3/rad2", 1e-4): "s3/rad2"}  # fmt: skip
-    for (unit, size), name in cases.items():
-        assert scale_of(unit, size)[0] == name
-    assert scale_of("N m", 2e-5)[1] * 2e-5 == pytest.approx(20.0)
-    with angles_in("rad"):
-        assert scale_of("rad/s") == ("rad/s", 1.0)
-    assert scale_of("rad/s")[0] == "deg/s"
-
-
 def test_a_folder_whose_name_is_no_utf_8(found, tmp_path, run):
     folder = tmp_path / os.fsdecode(b"m\xe9s")
     assert "report.html" in found.save(folder, {"command": f"armid identify --out {folder}", "settings": {}})
@@ -309,13 +297,21 @@ def test_arguments_are_spelt_out_with_their_types(name, axis):
             function(axis, efects=["viscous"])
 
 
-def test_catalogues_and_their_things_show_themselves_in_a_few_lines():
+def test_catalogues_and_things_show_themselves_in_a_few_lines_and_sizes_get_a_prefix():
     things = (armid.EFFECTS, armid.IDENTIFIERS, armid.PLANTS, armid.FITNESS, armid.suite(), EFFECTS["coulomb"],
               armid.IDENTIFIERS["pso"], PLANTS["shell_transfer_arm"], armid.Model(PLANTS["rotary_arm"]))  # fmt: skip
     for thing in things:
         assert 20 < len(repr(thing)) < 1_000
         assert " at 0x" not in repr(thing)
     assert all(name in repr(armid.EFFECTS) for name in EFFECTS)
+    cases = {("N m", 2e-5): "uN m", ("N m", 0.5): "N m", ("N m", 2e4): "kN m", ("s", 2e-3): "ms", ("V", 0.0): "V",
+             ("kg m2", 1e-5): "kg m2", ("1", 1e-5): "1", ("Pa", 1.0): "MPa", ("s3/rad2", 1e-4): "s3/rad2"}  # fmt: skip
+    for (unit, size), name in cases.items():
+        assert scale_of(unit, size)[0] == name
+    assert scale_of("N m", 2e-5)[1] * 2e-5 == pytest.approx(20.0)
+    with angles_in("rad"):
+        assert scale_of("rad/s") == ("rad/s", 1.0)
+    assert scale_of("rad/s")[0] == "deg/s"
 
 
 def test_a_bar_is_drawn_when_it_is_asked_for(axis, monkeypatch, capsys):
@@ -344,7 +340,8 @@ def test_the_log_is_printed_from_a_level_on(capsys):
 
 
 @pytest.mark.slow
-def test_a_study_shows_itself(table_study, tmp_path):
+def test_a_study_shows_itself(table_study, tmp_path, monkeypatch):
+    monkeypatch.setattr("armid.report.files.save", not_drawn)
     out = copytree(table_study / "out", tmp_path / "out")
     results = armid.run_study(table_study / "tiny.toml", jobs=1, out=out)
     shows(results, tmp_path)

@@ -10,7 +10,6 @@ from pathlib import Path
 import pytest
 
 import armid
-from armid.cli.main import main
 from armid.cli.new import NEW_KINDS
 from armid.model import EFFECTS, PLANTS
 from armid.registry import load_plugin, load_registry
@@ -20,20 +19,23 @@ FROZEN = Path(__file__).parent / "frozen"
 FILES = {"fitness": (), "identifier": (), "effect": ("--on", "driven_axis"), "plant": ()}
 
 
-def ran(capsys, *words):
-    """Run a command that has to end well; return what it printed."""
-    with pytest.raises(SystemExit) as left:
-        main(list(map(str, words)))
-    captured = capsys.readouterr()
-    assert (left.value.code, captured.err) == (0, "")
-    return captured.out
+@pytest.fixture
+def ran(run):
+    """Return a function that runs a command that has to end well, and returns what it printed."""
+
+    def output(*words):
+        done = run(*words)
+        assert (done.code, done.err) == (0, "")
+        return done.out
+
+    return output
 
 
 @pytest.mark.parametrize(("kind", "on"), FILES.items())
-def test_starting_files_of_then_and_now_pass_their_contract(kind, on, capsys, tmp_path, monkeypatch):
+def test_starting_files_of_then_and_now_pass_their_contract(kind, on, ran, tmp_path, monkeypatch):
     """One check where `armid new` still writes the frozen text."""
     monkeypatch.chdir(tmp_path)
-    made = ran(capsys, "new", kind, f"my_{kind}", "--out", "mine")
+    made = ran("new", kind, f"my_{kind}", "--out", "mine")
     file = tmp_path / "mine" / f"my_{kind}.py"
     assert made.partition("try: armid ")[2].split() == ["check", f"mine/my_{kind}.py:my_{kind}"]
     assert [p.name for p in file.parent.iterdir() if p.is_file()] == [file.name]
@@ -42,22 +44,19 @@ def test_starting_files_of_then_and_now_pass_their_contract(kind, on, capsys, tm
     assert text.count("#") >= 3
     frozen = FROZEN / file.name
     for each in [file] if text == frozen.read_text(encoding="utf-8") else [file, frozen]:
-        output = ran(capsys, "check", f"{each}:my_{kind}", *on)
+        output = ran("check", f"{each}:my_{kind}", *on)
         assert re.search(r"^(\d+) of \1 points hold$", output, re.MULTILINE)
 
 
-def test_every_kind_of_starting_file_that_is_frozen_is_still_there():
+def test_every_kind_of_starting_file_that_is_frozen_is_still_there_and_the_campaign_holds(ran):
     frozen = {path.stem.removeprefix("my_") for path in (*FROZEN.glob("my_*.py"), *FROZEN.glob("campaigns/my_*"))}
     assert len(frozen) == 5
     assert frozen <= set(NEW_KINDS)
-
-
-def test_a_starting_campaign_holds(capsys):
-    told = ran(capsys, "check", FROZEN / "campaigns" / "my_campaign")
+    told = ran("check", FROZEN / "campaigns" / "my_campaign")
     assert re.search(r"^(\d+) of \1 points hold$", told, re.MULTILINE)
 
 
-def test_campaigns_with_every_key_are_read():
+def test_campaigns_and_studies_with_every_key_are_read():
     arm, axis = (armid.read_campaign(FROZEN / "campaigns" / name) for name in ("arm", "axis"))
     assert arm.effects == ("coulomb",)
     assert (arm.parameters["p0"].low, arm.parameters["n"].fixed) == (2.9e6, 1.2)
@@ -65,9 +64,6 @@ def test_campaigns_with_every_key_are_read():
     assert arm.train[0].manoeuvre.constants["R"] == 0.5
     assert arm.holdout[0].repeat_of == "lower.csv"
     assert (axis.plant.name, axis.unit, len(axis.train[0].pieces)) == ("driven_axis", "m/s", 3)
-
-
-def test_studies_with_every_key_are_read():
     study, loops = (armid.read_study(FROZEN / f"{name}.toml") for name in ("study", "loops"))
     assert study.case_names == ["row 1", "recorded", "random 1", "random 2"]
     assert study.labels == ["wide", "pso+least_squares"]
@@ -94,7 +90,7 @@ def test_the_plant_of_a_user_is_read_and_composed():
     assert [guard.name for guard in told.guards] == ["upper_limit", "lower_limit"]
 
 
-def test_every_command_and_option_is_still_there(every_command):
+def test_every_command_option_name_and_registered_thing_is_still_there(every_command):
     there = {
         " ".join(words): {
             f"<{p.name}>" if p.param_type_name == "argument" else o for p in command.params for o in p.opts
@@ -104,18 +100,12 @@ def test_every_command_and_option_is_still_there(every_command):
     for line in (FROZEN / "options.txt").read_text(encoding="utf-8").splitlines():
         command = re.split(r" (?=--|<)", line)[0]
         assert set(line.removeprefix(command).split()) <= there[command], command
-
-
-def test_every_name_is_still_there():
     names = (FROZEN / "names.txt").read_text(encoding="utf-8").split()
     assert [name for name in names if not hasattr(armid, name)] == []
     exported: dict[str, object] = {}
     exec("from armid import *", exported)
     assert set(names) <= set(exported)
-
-
-def test_every_registered_thing_is_still_there():
-    """Names that campaigns, studies and commands may say."""
+    # Names that campaigns, studies and commands may say.
     catalogues = load_registry()
     for line in (FROZEN / "registered.txt").read_text(encoding="utf-8").splitlines():
         kind, *names = line.split()

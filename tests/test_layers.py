@@ -76,15 +76,12 @@ def test_no_circle_of_files():
         visit(module, ())
 
 
-def test_packages_only_re_export():
+def test_packages_only_re_export_and_the_model_knows_no_numba_and_no_files():
     for path, tree in TREES.items():
         for node in tree.body if path.name == "__init__.py" and path.parent != ROOT else ():
             docstring = isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
             names = isinstance(node, ast.Assign) and [t.id for t in node.targets] == ["__all__"]
             assert docstring or names or isinstance(node, ast.ImportFrom), f"{path}: {ast.unparse(node)[:60]}"
-
-
-def test_model_knows_no_numba_and_no_files():
     for path, tree in TREES.items():
         nodes = [*ast.walk(tree)] if layer_of(module_of(path)) == "model" else []
         modules = {a.name.split(".")[0] for n in nodes if isinstance(n, ast.Import) for a in n.names}
@@ -128,14 +125,11 @@ def test_test_stand_shares_no_code_with_the_package():
 NAMES = sorted(m.name for m in pkgutil.walk_packages(armid.__path__, "armid.") if m.name != "armid.__main__")
 
 
-def test_the_package_lists_its_names():
+def test_the_package_lists_its_names_and_all_is_true():
     for name, home in armid.HOME.items():
         assert getattr(armid, name) is getattr(importlib.import_module(home), name)
     assert dir(armid) == sorted(armid.HOME)
     assert not hasattr(armid, "nothing_of_the_sort")
-
-
-def test_all_is_true():
     for there in map(importlib.import_module, NAMES):
         names = getattr(there, "__all__", [])
         assert len(set(names)) == len(names), there

@@ -59,11 +59,6 @@ def blocks(readme):
 
 
 @pytest.fixture(scope="module")
-def commands(blocks):
-    return [line for language, text in blocks if not language for line in text.splitlines() if line]
-
-
-@pytest.fixture(scope="module")
 def recipes(root):
     """The recipes of studies/make_results.py."""
     return runpy.run_path(str(root / "studies" / "make_results.py"))["RECIPES"]
@@ -88,7 +83,7 @@ def committed(root, folder):
     return [root / name for name in names] or [path for path in (root / folder).rglob("*") if path.is_file()]
 
 
-def test_begins_with_two_commands_to_copy(blocks, root):
+def test_begins_with_two_commands_to_copy_and_is_short(blocks, root, readme):
     first, second = (text.strip().splitlines() for language, text in blocks[:2] if not language)
     assert len(first) == len(second) == 1
     assert "armid study studies/table1_short.toml" in first[0]
@@ -97,9 +92,6 @@ def test_begins_with_two_commands_to_copy(blocks, root):
         assert line.startswith("python3 -m venv .venv && .venv/bin/pip install -q -e ")
     words = shlex.split(first[0])
     assert (root / words[words.index("study") + 1]).is_file()
-
-
-def test_the_readme_is_short(readme):
     prose = [line for line in FENCE.sub("", readme).splitlines() if not line.startswith("|")]
     assert len(LINK.sub("]", " ".join(prose)).split()) <= MOST_WORDS
 
@@ -130,7 +122,8 @@ def test_every_option_exists_and_all_is_written_to_out(page, root):
         assert places or words[0] not in ("study", "new", "import", "close-loop", "simulate"), line
 
 
-def test_the_commands_run_and_git_ignores_what_they_write(commands, root, elsewhere, capsys):
+def test_the_commands_run_and_git_ignores_what_they_write(blocks, root, elsewhere, capsys):
+    commands = [line for text in blocks_of(blocks, "") for line in text.splitlines()]
     ours = [line for line in commands if line.startswith("armid ") and not any(part in line for part in LEFT_OUT)]
     assert {line.split()[1] for line in ours} >= {"check", "identify"}
     for line in ours:
@@ -147,7 +140,14 @@ def test_the_python_examples_run(blocks, elsewhere):
     assert re.match(r"\{'p0': .*'n': ", ran.stdout)
 
 
-def test_the_campaign_file_is_read(elsewhere, root):
+def test_files_that_pages_name_are_there_links_lead_somewhere_and_the_campaign_file_is_read(root, elsewhere):
+    for page in {*LINKED, *MOST_LINES}:
+        text = (root / page).read_text(encoding="utf-8")
+        for name in re.findall(r"`((?:studies|results)/[a-z][\w/.]+)`", text) if page in GUIDES else ():
+            assert (root / name).exists(), name
+        for link in set(LINK.findall(text)) - set(UNWRITTEN) if page in LINKED else ():
+            assert "//" in link or (root / page).parent.joinpath(link).resolve().exists(), (page, link)
+        assert len(text.splitlines()) <= MOST_LINES.get(page, 10**6), page
     found = FENCE.findall((root / TOUR).read_text(encoding="utf-8"))
     text = next(text for text in blocks_of(found, "toml") if 'plant = "shell_transfer_arm"\n[[records]]' in text)
     assert tomllib.loads(text)["records"]
@@ -156,26 +156,13 @@ def test_the_campaign_file_is_read(elsewhere, root):
     assert [r.file for r in read_campaign(elsewhere).train] == ["lower.csv"]
 
 
-def test_files_that_pages_name_are_there_links_lead_somewhere_and_pages_stay_short(root):
-    for page in {*LINKED, *MOST_LINES}:
-        text = (root / page).read_text(encoding="utf-8")
-        for name in re.findall(r"`((?:studies|results)/[a-z][\w/.]+)`", text) if page in GUIDES else ():
-            assert (root / name).exists(), name
-        for link in set(LINK.findall(text)) - set(UNWRITTEN) if page in LINKED else ():
-            assert "//" in link or (root / page).parent.joinpath(link).resolve().exists(), (page, link)
-        assert len(text.splitlines()) <= MOST_LINES.get(page, 10**6), page
-
-
-def test_results_hold_what_is_read_and_are_small(root, recipes):
+def test_results_hold_what_is_read_are_small_and_every_figure_is_shown_and_has_a_recipe(root, recipes):
     files = committed(root, "results")
     assert {path.suffix for path in files} <= {".csv", ".md", ".json", ".png"}
     assert sum(path.stat().st_size for path in files) <= MOST_MB * 1e6
     folders = {path.relative_to(root / "results").parts[0] for path in files if path != root / RESULTS}
     assert folders <= set(recipes)
     assert folders == {link.split("/")[0] for link in LINK.findall((root / RESULTS).read_text()) if "." in link}
-
-
-def test_every_committed_figure_is_shown_and_has_a_recipe(root, recipes):
     figures = {path.resolve() for path in committed(root, "results") if path.suffix == ".png"}
     shown = {
         (root / page).parent.joinpath(name).resolve()
@@ -206,14 +193,13 @@ def shape(text):
             for words, line in lines if words]  # fmt: skip
 
 
-def alike(shown, printed):
-    return shown[0] == printed[0] and shown[1] == pytest.approx(printed[1], rel=NEAR)
-
-
 def is_part_of(shown, printed):
     """Tell whether the lines that are shown come one after the other in what was printed; `...` leaves some out."""
     left = iter(printed)
-    return all(line[0] == ["..."] or any(alike(line, other) for other in left) for line in shown)
+    return all(
+        words == ["..."] or any(words == other and numbers == pytest.approx(known, rel=NEAR) for other, known in left)
+        for words, numbers in shown
+    )
 
 
 def ran(line, capsys):

@@ -102,16 +102,7 @@ def test_what_is_registered_is_ready_to_use_and_catalogues_stay_as_they_are(own)
     assert "drag" not in Registry().effects
 
 
-def test_what_a_plug_in_imports_beside_it_counts_as_its_content(tmp_path):
-    (tmp_path / "whole.py").write_text(OWN.replace("import beside_it", "import beside_that"))
-    digests = []
-    for text in ("there = 1\n", "there = 2\n"):
-        (tmp_path / "beside_that.py").write_text(text)
-        digests.append(study_registry([f"{tmp_path / 'whole.py'}:effect"]).digests["effects", "drag"])
-    assert digests[0] != digests[1]
-
-
-def test_a_file_that_has_changed_is_run_again(tmp_path):
+def test_a_file_that_has_changed_is_run_again_and_what_it_imports_counts_as_its_content(tmp_path):
     """Equations are read from the file: those of the module must be the same."""
     file = tmp_path / "edited.py"
     file.write_text(OWN)
@@ -120,6 +111,12 @@ def test_a_file_that_has_changed_is_run_again(tmp_path):
     after = load_plugin(f"{file}:effect")[2]
     assert (before.name, after.name) == ("drag", "other_drag")
     assert "other_drag.c" in (Model(driven_axis) + after).parameters
+    (tmp_path / "whole.py").write_text(OWN.replace("import beside_it", "import beside_that"))
+    digests = []
+    for text in ("there = 1\n", "there = 2\n"):
+        (tmp_path / "beside_that.py").write_text(text)
+        digests.append(study_registry([f"{tmp_path / 'whole.py'}:effect"]).digests["effects", "drag"])
+    assert digests[0] != digests[1]
 
 
 @pytest.mark.parametrize(("attribute", "sentence"), [

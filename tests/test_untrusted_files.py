@@ -10,7 +10,7 @@ from shutil import copytree
 
 import pytest
 
-from commands import ended
+from commands import ended, not_drawn
 from input_texts import LOWERING
 
 ROOT = Path(__file__).parents[1] / "src" / "armid"
@@ -114,7 +114,8 @@ class Touch:
         return (Path.touch, (Path("touched"),))
 
 
-def test_a_store_with_a_pickle_in_it_runs_nothing(table_study, tmp_path):
+def test_a_store_with_a_pickle_in_it_runs_nothing(table_study, tmp_path, monkeypatch):
+    monkeypatch.setattr("armid.report.files.save", not_drawn)
     store = copytree(table_study / "out", tmp_path / "out") / "study.sqlite"
     written = store.read_bytes()
     for place in ("traces.trace", "runs.error", "study.value"):

@@ -27,7 +27,7 @@ def on_the_same_noise(made, offsets, **more):
     return Evidence(replace(results, runs=runs, parameters=rows.drop(columns=["case", "seed", "identifier"])))
 
 
-def test_differences_below_a_hundredth_of_the_bound_are_ties_and_those_who_arrived_are_counted(made):
+def test_differences_below_a_hundredth_of_the_bound_are_ties_in_chains_and_arrivals_are_counted(made):
     evidence = on_the_same_noise(made, {"exact": 0.0, "near": 0.004, "far": 0.5})
     steps = steps_of(evidence, "0.3 deg/s")
     assert list(steps.values()) == pytest.approx([0.01 * 2e-3] * 5)
@@ -39,9 +39,6 @@ def test_differences_below_a_hundredth_of_the_bound_are_ties_and_those_who_arriv
     said = "0.3 deg/s: 2 of the 3 identifiers that share a fitness arrive at its lowest value in most runs."
     assert said in text.text
     assert ranks.frame["arrived"].tolist() == [1.0, 1.0, 0.0]
-
-
-def test_ties_are_chains_and_the_floor_of_a_suite_is_the_same_rule():
     blocks = pd.DataFrame([[1.0, 1.4, 1.8, 3.0], [1.0, 1.4, 1.8, np.inf]], index=["a", "b"], columns=[*"wxyz"])
     assert tied(blocks, {"a": 0.5}).loc["a"].tolist() == [1.0, 1.0, 1.0, 3.0]
     assert tied(blocks, {"a": 0.5}).loc["b"].tolist() == [1.0, 1.4, 1.8, np.inf]

@@ -8,14 +8,11 @@ from armid.report.style import pyplot
 from armid.study.analyses.cramer_rao import cramer_rao_figure, efficiencies, efficiency, summary
 
 
-def test_by_hand():
+def test_by_hand_and_a_robust_ratio_that_single_lost_runs_do_not_move():
     found = efficiency([1.0, 2.0, 3.0, 6.0], truth=2.0, bound=2.0)
     assert found["n"] == 4
     assert found["ratio"] == pytest.approx(np.sqrt(14.0 / 3.0) / 2.0)
     assert found["bias"] == pytest.approx(0.5)
-
-
-def test_robust_ratio_of_a_normal_sample_is_the_ratio_and_single_lost_runs_do_not_move_it():
     x = np.random.default_rng(0).normal(3.0, 0.5, 4000)
     found = efficiency(x, 3.0, 0.5)
     assert found["ratio"] == pytest.approx(1.0, abs=0.04)
@@ -43,12 +40,9 @@ def estimates(n, scale):
     })  # fmt: skip
 
 
-def test_verdict():
+def test_verdict_and_none_of_too_few_realisations_or_without_a_bound():
     for scale, verdict in ((0.01, "yes"), (0.02, "no"), (0.005, "no")):
         assert efficiencies(estimates(2000, scale))["verdict"].tolist() == [verdict]
-
-
-def test_too_few_realisations_and_bounds_that_do_not_exist_say_nothing():
     assert efficiencies(estimates(19, 0.01)).empty
     assert efficiencies(estimates(50, 0.01).assign(deviation=np.inf)).empty
 

@@ -18,13 +18,10 @@ from armid.study.analyses.analysis import (
 from armid.study.analyses.success import SUCCESS_TOLERANCES
 
 
-def test_a_label_on_one_fitness_keeps_its_name_and_on_several_tells_which(made):
+def test_labels_and_settings_tell_what_differs(made):
     one, two = made(seeds=1), made(seeds=1, fitness=("rmse", "similarity"))
     assert set(outcomes(one.runs, one.parameters)["variant"]) == {"pso", "cmaes", "de+bobyqa"}
     assert "pso on rmse" in set(outcomes(two.runs, two.parameters)["variant"])
-
-
-def test_settings(made):
     one, two = made(seeds=1), made(seeds=1, windows=("0-0.7 s", "whole"))
     assert set(outcomes(one.runs, one.parameters)["setting"]) == {"noise-free", "0.3 deg/s"}
     assert "0.3 deg/s, whole" in set(outcomes(two.runs, two.parameters)["setting"])
@@ -71,15 +68,6 @@ POINT = st.tuples(st.integers(1, 500), st.floats(0.0, 2.0))
 SERIES = st.lists(POINT, min_size=1, max_size=20, unique_by=lambda p: p[0]).map(sorted)
 
 
-@pytest.fixture(scope="module")
-def kept(made):
-    """Results of 60 runs, the last of which failed, their outcomes and their histories."""
-    results = made(seeds=2, failed=1)
-    runs = outcomes(results.runs, results.parameters)
-    truths = {case["name"]: case["truth"] for case in results.study["cases"]}
-    return results, runs, histories(results, runs, truths, {})
-
-
 @given(SERIES)
 def test_first_hits_and_held_values_are_what_a_search_from_the_left_finds(series):
     evaluations, values = (np.array(column) for column in zip(*series, strict=True))
@@ -91,12 +79,9 @@ def test_first_hits_and_held_values_are_what_a_search_from_the_left_finds(series
     assert held(evaluations, values, grid) == pytest.approx(last)
 
 
-def test_the_tolerances_of_the_success_rates_are_targets():
+def test_the_tolerances_of_the_success_rates_are_targets_and_a_share_is_that_of_more_and_wild():
     assert len(TARGETS) == 51
     assert all((np.abs(TARGETS / t - 1.0) < 1e-12).any() for t in SUCCESS_TOLERANCES)
-
-
-def test_a_share_is_the_convergence_test_of_more_and_wild():
     values, first, best = np.array([9.0, 5.0, 1.1, 1.0]), 9.0, 1.0
     shares = remaining_share(values, first, best)
     for tau in (0.5, 0.1, 0.01):
@@ -106,8 +91,11 @@ def test_a_share_is_the_convergence_test_of_more_and_wild():
     assert remaining_share(np.array([2.0]), np.nan, 1.0).tolist() == [np.inf]
 
 
-def test_hits_and_held_values_of_each_run(kept):
-    results, runs, found = kept
+def test_hits_and_held_values_of_each_run_of_the_best_and_without_those_that_came_in_later(made):
+    results = made(seeds=2, failed=1)
+    runs = outcomes(results.runs, results.parameters)
+    truths = {case["name"]: case["truth"] for case in results.study["cases"]}
+    found = histories(results, runs, truths, {})
     assert np.isinf(found.error_hits[-1]).all()
     assert np.isinf(found.values[-1]).all()
     for i, trace in list(enumerate(results.iter_traces()))[::7]:
@@ -119,19 +107,11 @@ def test_hits_and_held_values_of_each_run(kept):
             assert found.error_hits[i, j] == hit
         assert found.values[i, -1] == pytest.approx(trace.values[-1], rel=1e-6)
         assert found.errors[i, -1] == pytest.approx(errors[-1], rel=1e-5)
-
-
-def test_the_best_run_on_a_problem_reaches_the_strictest_share(kept):
-    """Whoever found the best fitness on a case, noise and seed has nothing left; nobody has more at the end."""
-    _, runs, found = kept
+    # Whoever found the best fitness on a case, noise and seed has nothing left; nobody has more at the end.
     best = runs.groupby(["case", "setting", "fitness", "seed"])["value"].idxmin()
     assert np.isfinite(found.value_hits[best, -1]).all()
     assert np.isfinite(found.value_hits[:, -1]).sum() == len(best)
-
-
-def test_runs_that_came_in_later_are_left_out_and_unknown_truths_hit_nothing(kept):
-    """A runner may add runs while the report reads: traces of runs that are not in the table are no surprise."""
-    results, runs, _ = kept
+    # A runner may add runs while the report reads: traces of runs that are not in the table are no surprise.
     found = histories(results, runs.iloc[:10], {}, {})
     assert len(found.values) == 10
     assert np.isinf(found.error_hits).all()

@@ -3,44 +3,35 @@
 import json
 import warnings
 
+import iohinspector
 import numpy as np
 import pytest
 
-from armid.study.export import WORST_VALUE, export_ioh, lines
+from armid.study.export import WORST_VALUE, export_ioh, instance_numbers, lines
 from armid.study.store import RunTrace
-
-
-def export(results, folder):
-    def path_of(name):
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        return folder / name
-
-    return export_ioh(results, path_of)
 
 
 @pytest.fixture(scope="module")
 def exported(made, tmp_path_factory):
     folder = tmp_path_factory.mktemp("ioh")
     results = made(seeds=3, failed=2)
-    return folder, results, export(results, folder)
+
+    def path_of(name):
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        return folder / name
+
+    return folder, results, export_ioh(results, path_of)
 
 
-@pytest.fixture(scope="module")
-def loaded(exported):
-    import iohinspector
-
+def test_every_run_that_ended_well_is_there_and_every_improvement_comes_back_bit_for_bit(exported):
     manager = iohinspector.DataManager()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         manager.add_folder(str(exported[0]))
-    return manager
-
-
-def test_every_run_that_ended_well_is_there(exported, loaded):
     _, results, n_runs = exported
     done = results.runs[results.runs["status"] == "done"]
-    assert n_runs == loaded.n_runs == len(done) == 88
-    overview = loaded.overview.to_pandas()
+    assert n_runs == manager.n_runs == len(done) == 88
+    overview = manager.overview.to_pandas()
     assert set(overview["algorithm_name"]) == {"pso", "cmaes", "de+bobyqa"}
     assert overview["function_id"].nunique() == 10
     assert set(overview["dimension"]) == {4}
@@ -51,11 +42,7 @@ def test_every_run_that_ended_well_is_there(exported, loaded):
         found = named.loc[(run.identifier, f"{run.case}, {noise}, similarity", run.seed)]
         assert found["best_y"] == run.value
         assert found["evals"] == run.used
-
-
-def test_every_improvement_comes_back_bit_for_bit(exported, loaded):
-    _, results, _ = exported
-    rows = loaded.load(monotonic=False, include_meta_data=True).to_pandas()
+    rows = manager.load(monotonic=False, include_meta_data=True).to_pandas()
     trace = results.kept[3]
     run = results.runs.set_index("run").loc[trace.run]
     own = rows[(rows["algorithm_name"] == run["identifier"]) & (rows["instance"] == run["seed"])
@@ -65,10 +52,13 @@ def test_every_improvement_comes_back_bit_for_bit(exported, loaded):
     assert own[["x0", "x1", "x2", "x3"]].to_numpy().tolist() == trace.X.tolist()
 
 
-def test_a_first_candidate_that_failed_is_logged_as_worst_and_an_early_end_is_logged():
+def test_a_failed_first_candidate_and_an_early_end_are_logged_and_large_seeds_become_places(made, tmp_path):
     trace = RunTrace("r", np.array([3]), np.array([0.5]), np.array([[1.0]]), ("k",))
     assert list(lines(trace, 7)) == [f"1 {WORST_VALUE!r} nan\n", "3 0.5 1.0\n", "7 0.5 1.0\n"]
     assert list(lines(trace, 3)) == [f"1 {WORST_VALUE!r} nan\n", "3 0.5 1.0\n"]
+    results = made(seeds=2)
+    assert instance_numbers(results.runs) == {1: 1, 2: 2}
+    assert instance_numbers(results.runs.assign(seed=results.runs["seed"] * 100_000)) == {100_000: 1, 200_000: 2}
 
 
 def test_no_text_of_a_study_file_is_given_to_a_program_that_evaluates_it(exported):
@@ -76,11 +66,3 @@ def test_no_text_of_a_study_file_is_given_to_a_program_that_evaluates_it(exporte
     for file in exported[0].rglob("*.json"):
         for attribute in json.loads(file.read_text())["experiment_attributes"]:
             assert all(float(value) >= 0.0 for value in attribute.values())
-
-
-def test_large_seeds_become_places(made, tmp_path):
-    from armid.study.export import instance_numbers
-
-    results = made(seeds=2)
-    assert instance_numbers(results.runs) == {1: 1, 2: 2}
-    assert instance_numbers(results.runs.assign(seed=results.runs["seed"] * 100_000)) == {100_000: 1, 200_000: 2}

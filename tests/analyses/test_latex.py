@@ -42,14 +42,11 @@ def wide(n_columns=14, n_rows=70):
     return table("Wide & long", columns, rows, "50 % of $x_1$ <is> {odd} \\here ~ ^." * 8, "wide")
 
 
-def long_text():
-    rows = [("a/very/long/path/of_a_file_that_no_line_takes/and/more_of_it.csv " * 3, 1.0), ("short", -2.5e-7)]
-    return table("Texts", ["what", Column("v", "eta3 [%]", "+.2e")], rows, "Words.", "texts")
-
-
 def test_tables_of_any_width_and_length_and_those_of_a_study_fit_the_text(made, tmp_path):
     own = [latex(t) for kind in ("table1", "table2") for t in report_of(made(seeds=2, report=kind)).tables if t.most]
-    log = log_of([latex(wide()), latex(long_text()), *own], tmp_path)
+    rows = [("a/very/long/path/of_a_file_that_no_line_takes/and/more_of_it.csv " * 3, 1.0), ("short", -2.5e-7)]
+    texts = table("Texts", ["what", Column("v", "eta3 [%]", "+.2e")], rows, "Words.", "texts")
+    log = log_of([latex(wide()), latex(texts), *own], tmp_path)
     assert "Overfull" not in log
     assert "Float too large" not in log
 
@@ -79,15 +76,10 @@ def test_table_2_has_the_papers_means_and_deviations(made):
     assert np.isnan([rows["the paper", "row 1"][i] for i in (0, 2)]).all()
 
 
-def test_every_row_of_a_long_table_is_written_once():
+def test_every_row_of_a_long_table_is_written_once_and_names_become_symbols():
     text = latex(wide())
     assert all(len(re.findall(rf"least\\_squares {i} &", text)) == 1 for i in range(70))
     assert len(set(re.findall(r"\\label{(.*)}", text))) == text.count(r"\end{table}") == 2
-
-
-@pytest.mark.parametrize(("name", "text"), [
-    ("p0", "$p_{0}$"), ("eta3", r"$\eta_{3}$"), ("k", "$k$"), ("a", "a"), ("mass", "mass"), ("tau", r"$\tau$"),
-    ("coulomb.torque_1", r"coulomb.torque\_1"),
-])  # fmt: skip
-def test_names_become_symbols(name, text):
-    assert symbol(name) == text
+    symbols = {"p0": "$p_{0}$", "eta3": r"$\eta_{3}$", "k": "$k$", "a": "a", "mass": "mass", "tau": r"$\tau$",
+               "coulomb.torque_1": r"coulomb.torque\_1"}  # fmt: skip
+    assert {name: symbol(name) for name in symbols} == symbols

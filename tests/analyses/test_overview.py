@@ -4,20 +4,20 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
-from made_results import MadeResults
+from made_results import PAPER_CASES, MadeResults
 
+from armid.report.files import markdown
 from armid.study.analyses.analysis import Evidence
-from armid.study.analyses.errors import (
-    brief,
-    end_points,
-    error_map,
-    error_map_figure,
-)
+from armid.study.analyses.errors import brief, end_points, error_map, error_map_figure
 from armid.study.analyses.fitness_quality import fitness_quality, fitness_quality_figure
 from armid.study.analyses.overview import loop_runs, main_table, reasons, runs_table
 from armid.study.analyses.success import success
 from armid.study.document import report_of, summary_of
+from armid.study.results import load_study
+from armid.study.runner import run_study
+from armid.study.tasks import read_study
 from armid.units import angles_in
+from input_texts import TABLE_STUDY
 
 
 def test_the_overview_begins_with_the_paper(made):
@@ -60,7 +60,17 @@ def test_a_study_shows_its_fitness_in_the_unit_of_its_records(made, angle, label
     plt.close(figure)
 
 
-def test_runs_are_counted_with_their_failures_and_reasons(made):
+def outcomes_with(errors):
+    return pd.DataFrame({"setting": "noise-free", "variant": "pso", "largest_error": errors})
+
+
+def test_success_at_the_tolerance_with_its_interval_and_runs_are_counted_with_their_failures(made):
+    row = success(outcomes_with([1e-2, 0.0099, 0.02, np.inf, np.nan])).frame.iloc[0]
+    assert (row["n"], row["within_1_percent_successes"], row["within_0.1_percent_successes"]) == (4, 2, 0)
+    assert (row["within_1_percent_rate"], row["within_0.1_percent_rate"]) == (0.5, 0.0)
+    table = success(outcomes_with([1e-5] * 8 + [1.0] * 2))
+    # Wilson's interval of 8 of 10
+    assert table.frame.loc[0, "within_1_percent_text"] == "80.0 (49.0 to 94.3)"
     evidence = Evidence(made(seeds=1, noises=(0.0,), failed=2))
     counts = runs_table(evidence.runs, evidence.parameters).frame.set_index("variant")
     assert counts["failed"].to_dict() == {"pso": 0, "cmaes": 1, "de+bobyqa": 1}
@@ -68,28 +78,8 @@ def test_runs_are_counted_with_their_failures_and_reasons(made):
     assert found == {"budget used": 13, "failed: it broke": 2}
 
 
-def outcomes_with(errors):
-    return pd.DataFrame({"setting": "noise-free", "variant": "pso", "largest_error": errors})
-
-
-def test_at_the_tolerance_is_within_a_failed_run_is_no_success_and_an_unknown_truth_no_evidence():
-    row = success(outcomes_with([1e-2, 0.0099, 0.02, np.inf, np.nan])).frame.iloc[0]
-    assert (row["n"], row["within_1_percent_successes"], row["within_0.1_percent_successes"]) == (4, 2, 0)
-    assert (row["within_1_percent_rate"], row["within_0.1_percent_rate"]) == (0.5, 0.0)
-
-
-def test_success_rates_show_their_interval_in_percent():
-    table = success(outcomes_with([1e-5] * 8 + [1.0] * 2))
-    # Wilson's interval of 8 of 10
-    assert table.frame.loc[0, "within_1_percent_text"] == "80.0 (49.0 to 94.3)"
-
-
-@pytest.fixture(scope="module")
-def evidence(made):
-    return Evidence(made(seeds=2))
-
-
-def test_the_error_map_has_medians_in_the_orders_given(evidence):
+def test_the_error_map_has_medians_in_the_orders_given_and_deviations_are_in_percent(made):
+    evidence = Evidence(made(seeds=2))
     runs = evidence.of("noise-free")
     errors = error_map(runs, ["de+bobyqa", "pso", "unknown"], ["row 2", "row 1"])
     assert list(errors.index) == ["de+bobyqa", "pso"]
@@ -99,9 +89,6 @@ def test_the_error_map_has_medians_in_the_orders_given(evidence):
     figure = error_map_figure({"noise-free": errors})
     assert brief(100.0 * errors.loc["pso", "row 1"]) in {t.get_text() for t in figure.axes[0].texts}
     plt.close(figure)
-
-
-def test_deviations_in_percent_of_the_valley_and_of_other_machines_first_three_parameters(evidence):
     ends = end_points(evidence.estimates)
     assert list(ends.columns) == ["variant", "setting", "p0", "eta3", "n", "k"]
     rows = evidence.parameters
@@ -125,16 +112,13 @@ def test_a_plug_in_has_the_first_colour_and_every_fitness_a_strip(made):
     plt.close(figure)
 
 
-def frame():
-    return pd.DataFrame({
+def test_the_ranks_of_fitnesses_by_hand():
+    runs = pd.DataFrame({
         "setting": "noise-free", "identifier": "pso", "status": "done", "fitness": ["similarity"] * 4 + ["rmse"] * 4,
         "train_s": [0.9, 0.99, 0.999, np.nan, 0.9, 0.99, 0.999, 0.9999],
         "largest_error": [3e-1, 2e-2, 1e-3, np.inf, 1e-3, 2e-3, 3e-3, 4e-3],
     })  # fmt: skip
-
-
-def test_the_ranks_of_fitnesses_by_hand():
-    table = fitness_quality(frame()).frame.set_index("fitness")
+    table = fitness_quality(runs).frame.set_index("fitness")
     # similarity: the better S the smaller the error; rmse: the other way round; a failed run is infinite
     assert table["correlation"].round(12).to_dict() == {"similarity": 1.0, "rmse": -1.0}
     assert table.loc["similarity", "median_error"] == (2e-2 + 3e-1) / 2
@@ -147,9 +131,7 @@ def report(effects, after, holdout=0.03):
     return {"plant": "shell_transfer_arm", "effects": effects, "noise_rms": 0.01, "error": error}
 
 
-@pytest.fixture(scope="module")
-def closed():
-    """Results of three campaigns, one of which failed."""
+def test_closed_loops_have_a_row_each_and_a_report_that_counts_verdicts(tmp_path):
     loops = pd.DataFrame({
         "case": ["c0", "c1"], "verdict": ["explained", "no_discrepancy"], "cpu_seconds": [3.0, 0.5],
         "seconds": [4.0, 0.6], "report": [report(["tilt", "backlash"], 0.0101), report([], None)],
@@ -159,19 +141,12 @@ def closed():
         "campaigns": "campaigns/c", "made_by": "make them", "key": "key.json", "candidates": ["tilt"], "rivals": {},
         "versions": {"armid": "0"}, "n_planned": 3, "n_done": 2, "n_failed": 1,
     }  # fmt: skip
-    results = MadeResults(pd.DataFrame({"model": ["m", "m", None]}), pd.DataFrame(), study)
-    results.loops = loops
-    return results
-
-
-def test_each_campaign_has_a_row_with_its_errors_over_the_noise(closed):
+    closed = MadeResults(pd.DataFrame({"model": ["m", "m", None]}), pd.DataFrame(), study)
+    closed.loops = loops
     rows = loop_runs(closed.loops)
     assert rows["effects"].tolist() == ["tilt + backlash", "nothing"]
     assert rows["before"].tolist() == pytest.approx([3.0, 3.0])
     assert rows["after"].tolist() == pytest.approx([1.01, np.nan], nan_ok=True)
-
-
-def test_the_report_counts_verdicts_and_says_what_scores_them(closed, tmp_path):
     document = report_of(closed, tmp_path / "key.json", {"slow": lambda runs: runs[runs["cpu_seconds"] > 1]})
     assert document.answer == ("Of 2 campaigns: 1 explained, 1 no discrepancy.",
                                "Complete: 3 of 3 campaigns, 1 of them failed.")  # fmt: skip
@@ -181,9 +156,44 @@ def test_the_report_counts_verdicts_and_says_what_scores_them(closed, tmp_path):
     assert "python studies/blind/score.py" in said
     assert "no machine was measured" in said
     assert summary_of(closed).main[0].frame["n"].tolist() == [1, 1]
-
-
-def test_campaigns_that_all_failed_are_no_finding(closed):
     failed = MadeResults(closed.runs, closed.parameters, closed.study | {"n_done": 0, "n_failed": 3})
     failed.loops = closed.loops[:0]
     assert report_of(failed).answer[0] == "No campaign was closed."
+
+
+def test_each_budget_is_run_by_itself(tmp_path):
+    text = TABLE_STUDY.replace("seeds = 2", "seeds = 1")
+    line = next(line for line in text.splitlines() if line.startswith("budget = "))
+    (tmp_path / "tiny.toml").write_text(text.replace(line, "budget = [40, 90]"), encoding="utf-8")
+    study = read_study(tmp_path / "tiny.toml")
+    assert [entry.budgets(4) for entry in study.entries] == [[40, 90]] * len(study.entries)
+    run_study(tmp_path / "tiny.toml", jobs=1, out=tmp_path / "out")
+    runs = load_study(tmp_path / "out").runs
+    assert (runs["used"] <= runs["budget"]).all()
+    assert runs.groupby("identifier")["budget"].apply(sorted).map(tuple).unique().tolist() == [(40, 90)]
+    text = markdown(report_of(load_study(tmp_path / "out")))
+    assert "| budget |" in text.replace("**", "")
+    assert ", 40 simulations: " in text
+
+
+def columns_of(results):
+    evidence = Evidence(results)
+    table = evidence.apart(main_table(evidence))
+    return evidence, [c.header for c in table.columns if c.key.startswith("setting")], table.frame
+
+
+def test_noise_window_and_budget_have_columns_of_their_own_as_far_as_they_differ(made):
+    results = made(cases=PAPER_CASES[:2], noises=(0.0, 0.3), windows=("0-0.7 s", "whole"), seeds=2)
+    _, headers, frame = columns_of(results)
+    assert headers == ["noise", "window"]
+    assert set(frame["setting_noise"]) == {"noise-free", "0.3 deg/s"}
+    assert set(frame["setting_window"]) == {"0-0.7 s", "whole"}
+    results.runs["budget"] = results.runs["seed"].map(lambda seed: 500 if seed < 2 else 3000)
+    evidence, headers, frame = columns_of(results)
+    assert headers == ["noise", "window", "budget"]
+    assert evidence.settings[:2] == ["noise-free, 0-0.7 s, 500 simulations", "noise-free, 0-0.7 s, 3,000 simulations"]
+    assert set(frame["setting_budget"]) == {"500", "3,000"}
+    assert columns_of(made(noises=(0.0,), seeds=2))[1] == ["noise"]
+    # the paper has no setting
+    _, _, frame = columns_of(made(report="table1", noises=(0.0, 0.3), seeds=2))
+    assert frame.loc[frame["variant"] == "the paper's pso", "setting_noise"].tolist() == [""]

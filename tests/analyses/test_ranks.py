@@ -40,49 +40,15 @@ def outcomes_of(blocks, names, seeds=1):
     return pd.DataFrame(rows)
 
 
-def test_demsars_mean_ranks():
+def test_demsars_mean_ranks_with_their_matrix_tables_and_diagram():
     tests = rank_tests(outcomes_of(1.0 - AUC, NAMES))
     assert tests.ranks[NAMES].round(3).tolist() == [3.143, 2.000, 2.893, 1.964]
     assert list(tests.ranks.index[:2]) == ["C4.5+m+cf", "C4.5+m"]
-
-
-def test_seeds_of_a_case_are_no_further_evidence():
-    one, many = (rank_tests(outcomes_of(1.0 - AUC, NAMES, seeds)) for seeds in (1, 7))
-    assert one.friedman == many.friedman
-    assert one.pairs["p"].tolist() == many.pairs["p"].tolist()
-
-
-def test_signed_rank_of_pairs_that_all_agree_is_two_of_all_signs_and_1_without_a_difference():
-    for n in (5, 8):
-        assert signed_rank(np.arange(1.0, n + 1), 3.0 * np.arange(1.0, n + 1) ** 2) == pytest.approx(2.0 ** (1 - n))
-    assert signed_rank(np.ones(6), np.ones(6)) == 1.0
-    assert signed_rank(np.ones(1), 2.0 * np.ones(1)) == 1.0
-    assert signed_rank(np.full(6, np.inf), np.full(6, np.inf)) == 1.0
-
-
-def test_corrected_probabilities_as_a_matrix():
-    tests = rank_tests(outcomes_of(1.0 - AUC, NAMES))
     matrix = p_matrix(tests)
     assert (matrix.to_numpy() == matrix.to_numpy().T).all()
     assert (np.diag(matrix) == 1.0).all()
     first = tests.pairs.iloc[2]
     assert matrix.loc[first["first"], first["second"]] == first["p_holm"] >= first["p"]
-
-
-def test_errors_below_a_millionth_of_a_percent_are_equal():
-    tests = rank_tests(outcomes_of(np.array([[1e-9, 1e-13, 1.0], [1e-12, 1e-10, 1.0]]), ["a", "b", "c"]))
-    assert tests.ranks.to_dict() == {"a": 1.5, "b": 1.5, "c": 3.0}
-    assert tests.pairs.loc[0, "a12"] == 0.5
-
-
-def test_cases_that_not_all_ran_are_left_out_and_two_variants_have_no_friedman_test():
-    frame = outcomes_of(1.0 - AUC, NAMES)
-    assert rank_tests(frame[~((frame["case"] == "case 3") & (frame["variant"] == "C4.5"))]).n_cases == 13
-    assert np.isnan(rank_tests(outcomes_of(AUC[:, :2], NAMES[:2])).p)
-
-
-def test_tables_and_diagram():
-    tests = rank_tests(outcomes_of(1.0 - AUC, NAMES))
     assert "p = " in mean_ranks(tests, pd.Series(dtype=float), "noise-free", "ranks").caption
     table = pairs(tests, "noise-free", "pairs")
     assert len(table.frame) == 6
@@ -91,6 +57,26 @@ def test_tables_and_diagram():
     assert figure.axes[0].get_title() == ""
     assert {t.get_text().split(" (")[0] for t in figure.axes[0].texts if " (" in t.get_text()} >= {"C4.5+m"}
     plt.close(figure)
+
+
+def test_what_seeds_tiny_errors_and_cases_that_not_all_ran_count():
+    one, many = (rank_tests(outcomes_of(1.0 - AUC, NAMES, seeds)) for seeds in (1, 7))
+    assert one.friedman == many.friedman
+    assert one.pairs["p"].tolist() == many.pairs["p"].tolist()
+    tests = rank_tests(outcomes_of(np.array([[1e-9, 1e-13, 1.0], [1e-12, 1e-10, 1.0]]), ["a", "b", "c"]))
+    assert tests.ranks.to_dict() == {"a": 1.5, "b": 1.5, "c": 3.0}
+    assert tests.pairs.loc[0, "a12"] == 0.5
+    frame = outcomes_of(1.0 - AUC, NAMES)
+    assert rank_tests(frame[~((frame["case"] == "case 3") & (frame["variant"] == "C4.5"))]).n_cases == 13
+    assert np.isnan(rank_tests(outcomes_of(AUC[:, :2], NAMES[:2])).p)
+
+
+def test_signed_rank_of_pairs_that_all_agree_is_two_of_all_signs_and_1_without_a_difference():
+    for n in (5, 8):
+        assert signed_rank(np.arange(1.0, n + 1), 3.0 * np.arange(1.0, n + 1) ** 2) == pytest.approx(2.0 ** (1 - n))
+    assert signed_rank(np.ones(6), np.ones(6)) == 1.0
+    assert signed_rank(np.ones(1), 2.0 * np.ones(1)) == 1.0
+    assert signed_rank(np.full(6, np.inf), np.full(6, np.inf)) == 1.0
 
 
 SAMPLES = st.lists(st.integers(0, 9).map(float), min_size=1, max_size=15)

@@ -1,10 +1,8 @@
 """`armid report` and `armid export ioh` on a small study that was really run."""
 
-import hashlib
 import shutil
 import sqlite3
 from contextlib import closing
-from pathlib import Path
 from shutil import copytree
 from types import SimpleNamespace
 
@@ -16,34 +14,10 @@ from matplotlib.text import Text
 from armid.cli.options import put
 from armid.cli.study import words
 from armid.report import files as write
-from armid.report.style import pyplot
 from armid.study.results import load_study
 from armid.study.runner import Ending
 from armid.study.store import Counts
-from commands import ended
-
-
-@pytest.fixture(scope="module")
-def store(table_study, tmp_path_factory):
-    return copytree(table_study, tmp_path_factory.mktemp("reported") / "tiny") / "out"
-
-
-def not_drawn(figure, *paths):
-    pyplot().close(figure)
-    for path in paths:
-        path.write_text("<svg/>")
-
-
-def digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-@pytest.fixture(scope="module")
-def reported(store):
-    """The folder with its report, and the digest that its store had before."""
-    before = digest(store / "study.sqlite")
-    assert ended("report", store) == 0
-    return store, before
+from commands import ended, not_drawn
 
 
 def test_figures_for_a_paper_are_pdf_of_its_width_without_a_title(store, monkeypatch, tmp_path):
@@ -66,9 +40,10 @@ def test_figures_for_a_paper_are_pdf_of_its_width_without_a_title(store, monkeyp
     assert b"CreationDate" not in text
 
 
-def test_a_report_of_a_real_store(reported):
-    store, before = reported
-    assert digest(store / "study.sqlite") == before
+def test_a_report_of_a_real_store(store):
+    before = (store / "study.sqlite").read_bytes()
+    assert ended("report", store) == 0
+    assert (store / "study.sqlite").read_bytes() == before
     text = (store / "report.md").read_text()
     assert "Complete: 4 of 4 runs." in text
     assert "Versions: armid" in text

@@ -23,16 +23,15 @@ def named(axis):
     return [text.get_text() for text in axis.get_legend().get_texts()]
 
 
-def test_share_hit_by_hand():
+def test_share_hit_running_time_and_median_by_hand():
     hits = np.array([[1.0, 10.0], [5.0, np.inf]])
     assert share_hit(hits, np.array([1, 4, 5, 10, 99])).tolist() == [0.25, 0.25, 0.5, 0.75, 0.75]
-
-
-def test_running_time_by_hand():
     hits = np.array([[10.0, np.inf], [np.inf, np.inf], [30.0, np.inf]])
     ert, successes = expected_running_time(hits, np.array([100.0, 50.0, 40.0]))
     assert ert.tolist() == [(10 + 50 + 30) / 2, np.inf]
     assert successes.tolist() == [2, 0]
+    runs = np.array([[np.inf, 4.0], [np.inf, 3.0], [8.0, 2.0], [9.0, 1.0]], np.float32)
+    assert median(runs).tolist() == [9.0, 2.0]
 
 
 def test_table_takes_the_tolerances_and_counts_hits():
@@ -79,11 +78,6 @@ def test_a_waterfall_rises_to_what_the_worst_run_leaves():
     assert np.unique(one).tolist() == pytest.approx([1e-10])
     assert (np.diff(many) >= 0.0).all()
     plt.close(figure)
-
-
-def test_a_median_is_a_value_that_a_run_had():
-    runs = np.array([[np.inf, 4.0], [np.inf, 3.0], [8.0, 2.0], [9.0, 1.0]], np.float32)
-    assert median(runs).tolist() == [9.0, 2.0]
 
 
 def test_one_panel_a_setting_with_a_line_a_variant_and_runs_of_another_fitness_left_out():

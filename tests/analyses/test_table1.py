@@ -12,17 +12,9 @@ from armid.study.analyses.table2 import spread, table2
 PAPERS_MEANS = [0.487, 0.421, 0.171, 0.899]
 
 
-@pytest.fixture(scope="module")
-def estimates(made):
-    return Evidence(made(seeds=7)).estimates
-
-
-@pytest.fixture(scope="module")
-def rows(estimates):
-    return table1_rows(estimates, published_values({"cases": PAPER_CASES}))
-
-
-def test_one_row_by_hand(estimates, rows):
+def test_one_row_by_hand_and_the_last_four_are_means_beside_the_papers(made):
+    estimates = Evidence(made(seeds=7)).estimates
+    rows = table1_rows(estimates, published_values({"cases": PAPER_CASES}))
     key = {"setting": "0.3 deg/s", "variant": "pso", "case": "row 3", "parameter": "n"}
     own = estimates[np.all([estimates[k] == v for k, v in key.items()], axis=0)]
     row = rows[np.all([rows[k] == v for k, v in key.items()], axis=0)].iloc[0]
@@ -32,9 +24,6 @@ def test_one_row_by_hand(estimates, rows):
     assert row["error_of_median"] == pytest.approx(abs(np.median(own["value"]) - 1.2) / 1.2)
     assert (row["low"], row["high"]) == median_interval(own["relative_error"])
     assert row["percentile"] == pytest.approx(100.0 * np.mean(own["relative_error"] < 0.0105))
-
-
-def test_the_last_four_rows_are_means_beside_the_papers(rows):
     table = rows[(rows["setting"] == "noise-free") & (rows["variant"] == "pso")]
     assert len(table) == 24
     means = table.iloc[-4:]
@@ -83,7 +72,7 @@ def test_means_and_deviations_are_those_that_the_paper_prints():
         assert (found["n"], round(found["mean"], 4), round(found["deviation"], 4)) == (5, mean, deviation)
 
 
-def test_by_hand_in_mpa():
+def test_table_2_by_hand_in_mpa_and_the_papers_line_first():
     row = table2(two_records(), published()).frame.iloc[0]
     assert (row["unit"], row["n"], row["mean"], row["truth"], row["bound"]) == ("MPa", 4, 4.5, 4.0, 0.5)
     assert row["deviation"] == pytest.approx(np.std([1.0, 3.0, 5.0, 9.0]))
@@ -91,9 +80,6 @@ def test_by_hand_in_mpa():
     assert row["within"] == pytest.approx(np.sqrt((1.0**2 + 2.0**2) / 2))
     assert row["deviation"] ** 2 == pytest.approx(row["between"] ** 2 + row["within"] ** 2)
     assert row["n_at_bound"] == 1
-
-
-def test_the_papers_line_comes_first_with_its_own_bound_flagged():
     row = table2(two_records(), published(2.0, 4.0, 9.0)).frame.iloc[0]
     assert (row["variant"], row["mean"], row["n"], row["n_at_bound"]) == ("the paper's pso", 5.0, 3, 1)
     assert row["deviation"] == pytest.approx(np.std([2.0, 4.0, 9.0]))

@@ -158,20 +158,3 @@ def change(draw: st.DrawFn, holder: Any, key: Any) -> None:
         holder.append(holder[key] if what == "twice" else draw(VALUES))
     else:
         holder[draw(WORDS)] = holder[key] if what == "twice" else draw(VALUES)
-
-
-def written(value: Any) -> str:
-    if isinstance(value, bool):
-        return str(value).lower()
-    if isinstance(value, str):
-        # JSON's escapes are TOML's, but for lone surrogates, which no UTF-8 file holds
-        return json.dumps(value.encode("utf-8", "replace").decode())
-    if isinstance(value, dict):
-        return "{" + ", ".join(f"{written(str(k))} = {written(v)}" for k, v in value.items()) + "}"
-    if isinstance(value, list):
-        return "[" + ", ".join(map(written, value)) + "]"
-    return repr(value)
-
-
-def toml_of(table: dict[str, Any]) -> bytes:
-    return "".join(f"{written(str(k))} = {written(v)}\n" for k, v in table.items()).encode()

@@ -22,7 +22,6 @@ from reading_whatever import (
     mutated,
     outcome,
     read_whatever,
-    toml_of,
 )
 
 from armid.cli.options import assignments, interval, intervals, numbers, value_of
@@ -32,6 +31,7 @@ from armid.model import PLANTS, Model
 from armid.problem.meter import Meter, MeterTermination
 from armid.problem.space import space_of
 from armid.study.tasks import Study, read_study
+from input_texts import toml_of
 
 ARM, AXIS = tomllib.loads(ARM_TOML), tomllib.loads(AXIS_TOML)
 

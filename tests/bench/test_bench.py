@@ -3,7 +3,6 @@
 import sys
 from inspect import signature
 from itertools import count
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -52,16 +51,13 @@ def test_works_run_in_turn_and_the_shortest_time_counts() -> None:
     assert best == {"a": 1.0, "b": 1.0}
 
 
-def test_a_run_measures_every_part_in_turn(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bench, "bench_parts", lambda *_: {"first": lambda: ROWS[:2], "second": lambda: ROWS[2]})
-    assert bench.run_bench() == ROWS[:3]
-
-
-def test_quick_has_the_same_parts_with_options_that_they_take() -> None:
+def test_quick_has_the_same_parts_with_options_that_they_take_and_a_run_measures_every_part(monkeypatch) -> None:
     quick = bench.bench_parts(quick=True)
     assert list(quick) == list(bench.bench_parts())
     for part in quick.values():
         assert part.keywords.keys() <= signature(part.func).parameters.keys()
+    monkeypatch.setattr(bench, "bench_parts", lambda *_: {"first": lambda: ROWS[:2], "second": lambda: ROWS[2]})
+    assert bench.run_bench() == ROWS[:3]
 
 
 def assert_measured(row: Row) -> None:
@@ -92,14 +88,11 @@ def test_effects_are_measured_on_candidates_that_reach_their_switch() -> None:
     assert "16 of 16 candidates reach their switch" in row.note
 
 
-def test_threads_give_the_same_bits() -> None:
+def test_threads_give_the_same_bits_and_fitnesses_and_the_framework_are_measured_apart() -> None:
     row = threads_row(rounds=1, n_candidates=32, attempts=1)
     assert_measured(row)
     assert row.error <= ALLOWED
     assert "the same bits" in row.note
-
-
-def test_fitnesses_and_the_framework_are_measured_apart() -> None:
     whole, numerical = fitness_rows(rounds=1, n_candidates=4)
     assert whole.measured > numerical.measured > 0
     framework, whole = framework_rows(rounds=1, n_iterations=2, n_samples=101)
@@ -120,15 +113,12 @@ def test_memory_rows_compare_ten_times_the_work(monkeypatch: pytest.MonkeyPatch)
     assert (unknown.measured, unknown.met) == (None, None)
 
 
-def test_start_up_calls_the_command_with_a_campaign(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_start_up_calls_the_command_and_says_why_it_failed(tmp_path, monkeypatch):
     # a folder of its own: other tests compile into the shared one meanwhile
     monkeypatch.setenv("ARMID_CACHE", str(tmp_path))
     row = startup_row(rounds=1, command=STAND_IN, n_samples=60)
     assert 0 < row.ratio < np.inf
     assert "compiled nothing" in row.note
-
-
-def test_start_up_says_why_the_command_failed() -> None:
     command = (sys.executable, "-c", "raise SystemExit('no such thing')")
     with pytest.raises(ArmidError, match="no such thing"):
         startup_row(rounds=1, command=command, n_samples=60)

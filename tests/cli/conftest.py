@@ -105,3 +105,9 @@ def other_process(root: Path) -> Callable[..., "subprocess.CompletedProcess[str]
         return subprocess.run(command, check=False, capture_output=True, text=True, cwd=root, env=os.environ, **options)
 
     return ran
+
+
+@pytest.fixture
+def in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands write into a working folder of their own."""
+    monkeypatch.chdir(tmp_path)

@@ -14,26 +14,14 @@ USED = r"^(\d+) of (\d+) simulations used, (.*); seed (\d+)\.$"
 
 @pytest.fixture
 def identified(run, small_folder, tmp_path):
-    """Return a function that identifies the small campaign, and what it printed and wrote."""
+    """Return a function that identifies the small campaign, and what it printed and wrote, if it is to write."""
 
-    def written(*options, campaign=small_folder):
-        ran = run("identify", campaign, *QUICK, "--out", tmp_path / "out", *options)
+    def written(*options, campaign=small_folder, out=tmp_path / "out"):
+        ran = run("identify", campaign, *QUICK, *(("--out", out) if out else ()), *options)
         assert (ran.code, ran.err) == (0, "")
-        return ran.out, json.loads((tmp_path / "out" / "result.json").read_text())
+        return ran.out, json.loads((out / "result.json").read_text()) if out else None
 
     return written
-
-
-@pytest.fixture
-def printed(run, small_folder):
-    """Return a function that identifies the small campaign, and what it printed; nothing is drawn."""
-
-    def told(*options, campaign=small_folder):
-        ran = run("identify", campaign, *QUICK, *options)
-        assert (ran.code, ran.err) == (0, "")
-        return ran.out
-
-    return told
 
 
 def test_prints_tables_and_remarks_in_units_that_people_read(run, paper_arm_folder):
@@ -50,9 +38,7 @@ def test_prints_tables_and_remarks_in_units_that_people_read(run, paper_arm_fold
     assert max(len(line) for line in ran.out.splitlines() if "│" in line) <= 80
 
 
-def test_writes_result_and_figures_and_the_same_bits_in_another_process(
-    identified, printed, other_process, small_folder, tmp_path
-):
+def test_writes_result_and_figures_the_same_bits_in_another_process(identified, other_process, small_folder, tmp_path):
     text, result = identified("--seed", "7")
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
         "convergence.png", "convergence.svg", "details.json", "fit.png", "pairs.png", "pairs.svg", "report.html",
@@ -69,7 +55,7 @@ def test_writes_result_and_figures_and_the_same_bits_in_another_process(
     assert (again.returncode, again.stderr) == (0, "")
     assert "\x1b" not in again.stdout
     assert json.loads((tmp_path / "again" / "result.json").read_text()) == result
-    assert printed("--seed", "8").partition("Errors")[0] != text.partition("Errors")[0]
+    assert identified("--seed", "8", out=None)[0].partition("Errors")[0] != text.partition("Errors")[0]
 
 
 def test_fixed_values_and_bounds(identified):
@@ -87,7 +73,7 @@ def test_fixed_values_and_bounds(identified):
     assert re.search(r"n +│ +1\.4 +│ 1 +│ fixed", text)
 
 
-def test_effects_fitness_and_identifier_also_of_a_user_on_an_axis(identified, printed, mine, write_axis, tmp_path):
+def test_effects_fitness_and_identifier_also_of_a_user_on_an_axis(identified, mine, write_axis, tmp_path):
     axis = write_axis(tmp_path / "axis")
     options = ("--window", "0:2", "--effects", "coulomb, viscous", "--bounds", "coulomb.width=0.001:0.1", "--fitness")
     text, result = identified(
@@ -102,14 +88,15 @@ def test_effects_fitness_and_identifier_also_of_a_user_on_an_axis(identified, pr
     assert re.search(r"holdout: none +│ +│", text)
     assert "mm/s" in text
     plugins = ("--plugin", f"{mine}:cubic_drag", "--plugin", f"{mine}:largest_miss", "--fitness", "largest_miss")
-    assert "cubic_drag.c" in printed("--window", "0:2", *plugins, "--effects", "cubic_drag", campaign=axis)
+    text, _ = identified("--window", "0:2", *plugins, "--effects", "cubic_drag", campaign=axis, out=None)
+    assert "cubic_drag.c" in text
 
 
 @pytest.mark.parametrize(("fitness", "target", "reached"), [
     ("similarity", 0.9, r"train \(1\) +│ +[\d.]+ │ +[\d.e+]+ │ +([\d.]+)"), ("rmse", 0.2, r"train \(1\) +│ +([\d.]+)"),
 ])  # fmt: skip
-def test_target_stops_early(printed, fitness, target, reached):
-    text = printed("--target", target, "--fitness", fitness, "--budget", "5000")
+def test_target_stops_early(identified, fitness, target, reached):
+    text, _ = identified("--target", target, "--fitness", fitness, "--budget", "5000", out=None)
     used, _, stopped, _ = re.search(USED, text, re.MULTILINE).groups()
     assert int(used) < 2000
     assert int(used) % 80 == 0

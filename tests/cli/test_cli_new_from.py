@@ -10,12 +10,8 @@ import pytest
 from armid import read_campaign
 from armid.record.table import read_table
 
+pytestmark = pytest.mark.usefixtures("in_a_folder")
 N, INTERVAL = 2000, 0.004
-
-
-@pytest.fixture(autouse=True)
-def in_a_folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
 
 
 def wheel(seed, gain=30.0, damping=2.0):
@@ -154,19 +150,16 @@ def test_a_straight_machine_keeps_its_units(run, tmp_path, header, speed):
     assert "GUESS: its unit" not in (tmp_path / "lift" / "campaign.toml").read_text()
 
 
-def test_an_input_of_a_turning_machine_may_have_any_unit(run, tmp_path):
-    plain_file(tmp_path / "a.csv", "duty [%]")
-    assert run("new", "campaign", "wheel", "--from", "a.csv").code == 0
-    assert "command" in read_table(tmp_path / "wheel" / "a.csv", "a.csv").columns
-    assert run("check", "wheel").code == 0
-
-
-def test_an_unknown_unit_and_a_time_that_falls_are_refused(refused, tmp_path):
+def test_an_unknown_unit_and_a_time_that_falls_are_refused_and_an_input_may_have_any_unit(refused, tmp_path, run):
     (tmp_path / "a.csv").write_text("t [s],U [V],angle [gon]\n0,1,2\n1,1,3\n")
     assert "the unit of 'angle [gon]' is 'gon': one of deg, " in refused("new", "campaign", "wheel", "--from", "a.csv")
     plain_file(tmp_path / "b.csv", "U [V]", lambda t: np.where(np.arange(N) < 900, t, t - 2.0))
     assert "time does not rise from row 900 to row 901" in refused("new", "campaign", "wheel", "--from", "b.csv")
     assert not (tmp_path / "wheel").exists()
+    plain_file(tmp_path / "a.csv", "duty [%]")
+    assert run("new", "campaign", "wheel", "--from", "a.csv").code == 0
+    assert "command" in read_table(tmp_path / "wheel" / "a.csv", "a.csv").columns
+    assert run("check", "wheel").code == 0
 
 
 def test_the_plant_of_a_plug_in_is_the_one_of_the_campaign(run, refused):

@@ -18,6 +18,7 @@ from armid.model import EFFECTS
 from armid.study.runner import TIME_LIMIT_S
 
 ROOT = Path(__file__).parents[2]
+pytestmark = pytest.mark.usefixtures("in_a_folder")
 
 
 def test_list_effects(run):
@@ -32,16 +33,13 @@ def test_list_effects(run):
     assert re.search(r"^flux_sat.*\n  in the form rational\n(.*\n)*  in the form arctangent\n", ran.out, re.MULTILINE)
 
 
-def test_list_plants(run):
+def test_list_plants_and_an_effect_of_the_sensor_of_one(run):
     text = run("list", "plants", "--long").out.replace("\n      ", " ")
     assert "flexible_link (recorded in rad, rad, rad/s, rad/s)" in text
     for line in ("parameter p0 [Pa] from 2.6e+06 to 3.5e+06", "state omega [rad/s]", "port feedback [rad/s]",
                  "constant I6_loaded = 64 kg m2", "key supply_V sets U", "input u [V, N or N m] from drive_V or",
                  "I is another name for current"):  # fmt: skip
         assert line in text
-
-
-def test_an_effect_of_the_sensor_of_a_plant_is_listed_by_its_name(run):
     text = run("list", "effects", "hub_angle_scale").out
     assert "hub_angle_scale: error of hub_angle in proportion to it" in text
     assert text.rstrip().endswith("on flexible_link")
@@ -88,15 +86,7 @@ def test_the_shell_completes_values(words, begun, found):
     assert {item.value for item in completed} == found
 
 
-def test_an_installed_package_has_no_benchmarks(monkeypatch, tmp_path):
-    assert "bench" in Commands("armid").list_commands(None)
-    monkeypatch.setattr("armid.cli.main.STUDIES", tmp_path / "studies")
-    installed = Commands("armid")
-    assert "bench" not in installed.list_commands(None)
-    assert installed.get_command(None, "bench") is None
-
-
-def test_bench_prints_one_table(run, monkeypatch):
+def test_bench_prints_one_table_and_an_installed_package_has_none(run, monkeypatch, tmp_path):
     from bench import run as bench
     from bench.measure import Row
 
@@ -104,6 +94,11 @@ def test_bench_prints_one_table(run, monkeypatch):
     ran = run("bench", "--quick")
     assert ran.code == 0
     assert re.match(r"what +measured +ratio +of +wanted +met", ran.out)
+    assert "bench" in Commands("armid").list_commands(None)
+    monkeypatch.setattr("armid.cli.main.STUDIES", tmp_path / "studies")
+    installed = Commands("armid")
+    assert "bench" not in installed.list_commands(None)
+    assert installed.get_command(None, "bench") is None
 
 
 def test_help_tells_every_option(run, every_command):
@@ -124,13 +119,10 @@ def test_help_tells_every_option(run, every_command):
     assert "..." not in run("--help").out.partition("Commands:")[2]
 
 
-def test_without_a_command_the_help_is_shown(run):
+def test_without_a_command_the_help_is_shown_and_the_version_is_told(run):
     ran = run()
     assert ran.code == 2
     assert "Commands:" in ran.out + ran.err
-
-
-def test_version(run):
     assert re.fullmatch(r"armid, version \d+\.\d+\.\d+\n", run("--version").out)
 
 
@@ -138,8 +130,7 @@ def test_a_reader_that_leaves_changes_nothing_but_what_he_reads(small_folder, ro
     """As `| head -1` leaves, and `2>&1 | head -1`: what was computed is saved, and the exit code stays."""
     out = tmp_path / "out"
     quick = ("--window", "0:0.4", "--budget", "80", "--identifier", "random", "--out", out)
-    calls = [("list", "plants", "--json"), ("identify", small_folder, *quick), ("report", out)]
-    for call in calls:
+    for call in (("list", "plants", "--json"), ("identify", small_folder, *quick)):
         command = [sys.executable, "-m", "armid", *map(str, call)]
         with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=root) as process:
             process.stdout.close()
@@ -153,6 +144,7 @@ def test_a_reader_that_leaves_changes_nothing_but_what_he_reads(small_folder, ro
             process.stdout.close()
             assert process.stderr.read() == b""
         assert process.returncode == (0 if told else 2), told
+    command = [sys.executable, "-m", "armid", "report", str(out)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, cwd=root) as process:
         process.stdout.close()
     assert (process.returncode, (out / "report.html").is_file()) == (0, True)
@@ -178,11 +170,6 @@ def test_every_command_tells_an_example_that_exists(every_command):
         assert {word for word in said if word.startswith("--")} <= known, line
         for word in said:
             assert not word.startswith("studies/") or (ROOT / word).exists() or word.endswith(("emps", "dfki")), line
-
-
-@pytest.fixture(autouse=True)
-def in_a_folder(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
 
 
 def test_new_files_serve_at_once(run):
@@ -212,15 +199,12 @@ def test_a_campaign_is_read_moves_and_says_that_it_is_synthetic(run, tmp_path):
     assert files == ["synthetic_train.csv", "synthetic_holdout.csv"]
 
 
-def test_nothing_is_overwritten(run, refused, tmp_path):
+def test_nothing_is_overwritten_nor_written_through_a_link_that_leads_nowhere(run, refused, tmp_path):
     for kind in NEW_KINDS:
         assert run("new", kind, "mine", "--out", kind).code == 0
         before = {p: p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()}
         assert "exists already" in refused("new", kind, "mine", "--out", kind)
         assert {p: p.read_bytes() for p in tmp_path.rglob("*") if p.is_file()} == before
-
-
-def test_a_link_that_leads_nowhere_is_not_written_through(refused, tmp_path):
     (tmp_path / "mine.py").symlink_to(tmp_path / "elsewhere.py")
     assert "mine.py exists already" in refused("new", "effect", "mine")
     assert not (tmp_path / "elsewhere.py").exists()

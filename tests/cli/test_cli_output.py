@@ -4,7 +4,6 @@ import json
 import logging
 import warnings
 from functools import partial
-from shutil import copytree
 from threading import Event, Thread
 
 import pytest
@@ -16,6 +15,7 @@ from armid.record.campaign import warned_once
 from armid.report import files, html, style
 from armid.report.document import Column, Struck, Table, table
 from armid.report.terminal import print_table
+from commands import not_drawn
 
 QUICK = ("--budget", "80", "--window", "0:0.4")
 # A call of each command that needs no long work; OUT stands for a new folder, CAMPAIGN for a campaign of two records.
@@ -40,20 +40,8 @@ WIDE = table(
 )  # fmt: skip
 
 
-@pytest.fixture(scope="module")
-def study(table_study, tmp_path_factory):
-    return copytree(table_study, tmp_path_factory.mktemp("study") / "tiny") / "out"
-
-
-def not_drawn(figure, *paths):
-    style.pyplot().close(figure)
-    for path in paths:
-        path.write_text("<svg/>")
-    return "<svg/>"
-
-
 @pytest.fixture
-def called(run, small_folder, study, tmp_path, monkeypatch):
+def called(run, small_folder, store, tmp_path, monkeypatch):
     """Return a function that runs each call with more words, no figure drawn: (its words, what it left)."""
     for module, name in ((files, "save"), (style, "save"), (html, "svg_text")):
         monkeypatch.setattr(module, name, not_drawn)
@@ -61,7 +49,7 @@ def called(run, small_folder, study, tmp_path, monkeypatch):
     def all_of(lines, *more):
         for i, line in enumerate(lines):
             words = [
-                {"CAMPAIGN": small_folder, "STUDY": study, "OUT": tmp_path / f"{i}{more}"}.get(w, w)
+                {"CAMPAIGN": small_folder, "STUDY": store, "OUT": tmp_path / f"{i}{more}"}.get(w, w)
                 for w in line.split()
             ]
             yield line, run(*words, *more)
@@ -102,15 +90,6 @@ def test_json_is_one_object_and_quiet_prints_nothing(called, lines):
         assert (ran.code, bool(ran.out)) == (0, line.startswith("list")), line
 
 
-def test_a_point_that_takes_too_long_ends_the_check(run, tmp_path):
-    (tmp_path / "slow.py").write_text(
-        "import time\n\n\ndef slow(measured, simulated):\n    time.sleep(5.0)\n    return simulated[:, 0]\n"
-    )
-    ran = run("check", f"{tmp_path}/slow.py:slow", "--time-limit", "0.3")
-    assert ran.code == 1
-    assert "FAIL time limit: point 1 takes longer than 0.3 s" in ran.out
-
-
 def test_what_takes_long_is_announced_in_a_pipe_too(capsys):
     log = logging.getLogger("armid")
 
@@ -126,7 +105,13 @@ def test_what_takes_long_is_announced_in_a_pipe_too(capsys):
         assert capsys.readouterr() == ("", told)
 
 
-def test_the_doctor_tells_what_is_wrong(run, monkeypatch, tmp_path):
+def test_a_point_that_takes_too_long_ends_the_check_and_the_doctor_tells_what_is_wrong(run, monkeypatch, tmp_path):
+    (tmp_path / "slow.py").write_text(
+        "import time\n\n\ndef slow(measured, simulated):\n    time.sleep(5.0)\n    return simulated[:, 0]\n"
+    )
+    ran = run("check", f"{tmp_path}/slow.py:slow", "--time-limit", "0.3")
+    assert ran.code == 1
+    assert "FAIL time limit: point 1 takes longer than 0.3 s" in ran.out
     assert "3 of 3 points hold" in run("doctor").out
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("ARMID_CACHE", str(tmp_path / "file"))

@@ -12,6 +12,7 @@ import pytest
 from armid import ArmidError, read_campaign, read_study
 from armid.record.schema import CampaignSheet, Known, Override, RecordSheet
 from armid.study.spec import CaseSpec, EntrySpec, LoopSpec, ManoeuvreSpec, RandomCasesSpec, StudySpec, SuiteSpec
+from input_texts import toml_of
 
 SHEETS = (CampaignSheet, RecordSheet, Override, Known, StudySpec, LoopSpec, CaseSpec, EntrySpec, ManoeuvreSpec,
           RandomCasesSpec, SuiteSpec)  # fmt: skip
@@ -48,13 +49,6 @@ def test_every_committed_campaign_and_study_keeps_the_schema(root, schemas):
     assert len(files) > 15
 
 
-def toml(value):
-    """Return a value as TOML has it on one line."""
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{toml(key)} = {toml(inner)}" for key, inner in value.items()) + " }"
-    return f"[{', '.join(map(toml, value))}]" if isinstance(value, list) else json.dumps(value)
-
-
 @pytest.mark.parametrize(("file", "path", "value"), WRONG)
 def test_what_the_readers_refuse_the_schema_refuses(file, path, value, root, schemas, tmp_path):
     table = tomllib.loads((root / file).read_text(encoding="utf-8"))
@@ -67,20 +61,12 @@ def test_what_the_readers_refuse_the_schema_refuses(file, path, value, root, sch
     assert validator.is_valid(table)
     assert not validator.is_valid(wrong)
     written = copytree((root / file).parent, tmp_path / "there") / (root / file).name
-    written.write_text("".join(f"{toml(key)} = {toml(one)}\n" for key, one in wrong.items()), encoding="utf-8")
+    written.write_bytes(toml_of(wrong))
     with pytest.raises(ArmidError, match=r"expected|did you mean|unknown"):
         (read_campaign if kind_of(file) == "campaign" else read_study)(written)
 
 
-def test_every_key_has_a_meaning_of_one_sentence_and_its_kind_in_words():
-    for sheet in SHEETS:
-        for f in (f for f in fields(sheet) if f.metadata):
-            assert f.metadata["meaning"].endswith("."), (sheet, f.name)
-            assert f.metadata["expected"], (sheet, f.name)
-            assert f.metadata["kind"].schema, (sheet, f.name)
-
-
-def test_every_default_is_a_value_that_its_key_takes(schemas):
+def test_every_key_has_a_meaning_and_a_fitting_default_and_a_schema_offers_what_is_registered(schemas):
     sheets = {"campaign": schemas["campaign"], "study": schemas["study"]["else"], "loops": schemas["study"]["then"]}
     defaults = {(sheet, key): own["default"] for sheet, schema in sheets.items()
                 for key, own in schema["properties"].items() if "default" in own}  # fmt: skip
@@ -90,9 +76,11 @@ def test_every_default_is_a_value_that_its_key_takes(schemas):
     assert defaults["study", "noise_deg_s"] == [0.0]
     assert defaults["campaign", "unwrap"] is False
     assert ("study", "report") not in defaults
-
-
-def test_a_schema_offers_what_is_registered_and_takes_other_names(schemas):
+    for sheet in SHEETS:
+        for f in (f for f in fields(sheet) if f.metadata):
+            assert f.metadata["meaning"].endswith("."), (sheet, f.name)
+            assert f.metadata["expected"], (sheet, f.name)
+            assert f.metadata["kind"].schema, (sheet, f.name)
     plant = schemas["study"]["else"]["properties"]["plant"]
     assert "driven_axis" in plant["anyOf"][0]["enum"]
     jsonschema.Draft7Validator(plant).validate("my_plant")

@@ -51,7 +51,9 @@ def test_agrees_with_the_reference_trajectories(run, tmp_path, row):
         assert np.max(np.abs(simulated[3] - reference[3])) <= 500.0 * near
 
 
-def test_one_file_for_each_record_and_the_values_that_were_taken(run, paper_arm, paper_arm_folder, tmp_path):
+def test_one_file_for_each_record_and_the_values_taken_or_missing(
+    run, paper_arm, paper_arm_folder, tmp_path, refused, write_axis
+):
     ran = run("simulate", paper_arm_folder / "campaign.toml", "--set", "n=1.3", "--out", tmp_path / "new" / "folder")
     assert ran.code == 0
     files = sorted(p.name for p in (tmp_path / "new" / "folder").iterdir())
@@ -60,14 +62,23 @@ def test_one_file_for_each_record_and_the_values_that_were_taken(run, paper_arm,
     _, (times, *_, current) = table(tmp_path / "new" / "folder" / "raise.csv")
     np.testing.assert_allclose(times, np.arange(1201) / 1000, atol=1e-12)
     assert current[0] == 0.0
+    sentence = refused("simulate", write_axis(tmp_path / "axis"), "--out", tmp_path / "out")
+    assert "parameter 'mass' has no nominal value: a value is expected (kg)" in sentence
 
 
-def test_what_a_campaign_fixes_is_taken_unless_it_is_set(run, paper_arm_folder, tmp_path):
+def test_what_a_campaign_fixes_is_taken_unless_it_is_set_and_steps_that_are_too_long_are_told(
+    run, paper_arm_folder, tmp_path
+):
     folder = tmp_path / "campaign"
     shutil.copytree(paper_arm_folder, folder)
     with (folder / "campaign.toml").open("a") as toml:
         toml.write("[parameters.n]\nfixed = 1.2\n[parameters.k]\nfixed = 0.9\n")
     assert "k = 0.8\neta3 = 0.55\nn = 1.2\n" in run("simulate", folder, "--set", "k=0.8", "--out", tmp_path).out
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")
+        ran = run("simulate", paper_arm_folder, "--set", "p0=1e12", "--out", tmp_path / "out")
+    assert re.match(r"armid: warning: lower\.csv: the engine is off by up to \S+ rad/s even at its finest ", ran.err)
+    assert "armid: warning: p0 = 1e+12 is far outside the declared range, 2.6e+06 to 3.5e+06 Pa" in ran.err
 
 
 def test_an_axis_from_its_first_sample_shown_from_zero_on(run, write_axis, axis_speed, tmp_path):
@@ -86,20 +97,7 @@ def test_an_axis_from_its_first_sample_shown_from_zero_on(run, write_axis, axis_
     assert (np.diff(position) > 0).all()
 
 
-def test_an_axis_without_a_value_for_its_mass(refused, write_axis, tmp_path):
-    sentence = refused("simulate", write_axis(tmp_path / "axis"), "--out", tmp_path / "out")
-    assert "parameter 'mass' has no nominal value: a value is expected (kg)" in sentence
-
-
-def test_steps_that_are_too_long_are_told(run, paper_arm_folder, tmp_path):
-    with warnings.catch_warnings():
-        warnings.simplefilter("default")
-        ran = run("simulate", paper_arm_folder, "--set", "p0=1e12", "--out", tmp_path / "out")
-    assert re.match(r"armid: warning: lower\.csv: the engine is off by up to \S+ rad/s even at its finest ", ran.err)
-    assert "armid: warning: p0 = 1e+12 is far outside the declared range, 2.6e+06 to 3.5e+06 Pa" in ran.err
-
-
-def test_what_it_writes_is_a_campaign_s_record(run, paper_arm_folder, tmp_path):
+def test_what_it_writes_is_a_campaign_s_record_and_it_overwrites_nothing(run, paper_arm_folder, tmp_path, refused):
     folder = tmp_path / "campaign"
     shutil.copytree(paper_arm_folder, folder)
     run("simulate", folder, "--out", tmp_path / "simulated")
@@ -107,16 +105,8 @@ def test_what_it_writes_is_a_campaign_s_record(run, paper_arm_folder, tmp_path):
     record = read_campaign(folder).records[0]
     assert record.is_noise_free
     assert list(record.columns) == ["angle_rad", "current_A"]
-
-
-def test_measured_records_are_not_overwritten(refused, paper_arm_folder, tmp_path):
-    folder = tmp_path / "campaign"
-    shutil.copytree(paper_arm_folder, folder)
     before = (folder / "lower.csv").read_bytes()
     assert "is the folder of the campaign" in refused("simulate", folder, "--out", f"{folder}/../campaign")
     assert (folder / "lower.csv").read_bytes() == before
-
-
-def test_a_folder_in_the_place_of_a_file_is_told(refused, paper_arm_folder, tmp_path):
     (tmp_path / "out" / "lower.csv").mkdir(parents=True)
     assert "holds a folder lower.csv" in refused("simulate", paper_arm_folder, "--out", tmp_path / "out")

@@ -33,7 +33,7 @@ def failures(findings):
     pytest.param(kind, name, thing, id=f"{kind}-{name}", marks=[pytest.mark.slow] if name in LONG else [])
     for kind, things in (("plants", PLANTS), ("fitness", FITNESS), ("identifiers", IDENTIFIERS))
     for name, thing in things.items() if not getattr(thing, "package", "")
-])  # fmt: skip
+] + [("identifiers", name, identifier_of(name, IDENTIFIERS)) for name in COMPOSED])  # fmt: skip
 def test_registered_things_keep_their_contract(kind, name, thing):
     found = list(check_thing(kind, name, thing))
     assert failures(found) == []
@@ -67,11 +67,6 @@ def test_every_effect_keeps_its_contract(plant):
     points = {f.name.split(" on ")[0].split(" in ")[0] for name, f in found if name == effects[0].name}
     assert points >= {"binds", "null values", "documented", "printed", "null law", "acts", "responds", "finite",
                       "deterministic", "compiled"}  # fmt: skip
-
-
-@pytest.mark.parametrize("name", COMPOSED)
-def test_composed_identifiers_keep_their_contract(name):
-    assert failures(check_identifier(identifier_of(name, IDENTIFIERS))) == []
 
 
 OWN = [n for n, i in IDENTIFIERS.items() if not i.package]
@@ -122,40 +117,14 @@ def test_agrees_with_reference_trajectories(number: int) -> None:
 COASTING = Manoeuvre(0.01, 151, {"start_speed": 0.9}, {"u": np.zeros(151)})
 
 
-def still(time):
-    return 0.503 - time
-
-
-def brake(on, level):
-    return -level * on
-
-
-def corner(v, level):
-    return -level * np.maximum(v - 0.7, 0.0)
-
-
-def at_corner(v):
-    return v - 0.7
-
-
-def nothing():
-    return 0.0
-
-
-def pace(v):
-    return v
-
-
-def test_switches_once_and_between_samples() -> None:
-    late = Effect("late", (Parameter("level", "effort", 0, 9, null=0.0),), {"torque": brake},
-                  guards=(Guard("on", still, latch=True),))  # fmt: skip
+def test_switches_once_between_samples_lands_on_kinks_and_carries_added_states() -> None:
+    late = Effect("late", (Parameter("level", "effort", 0, 9, null=0.0),), {"torque": lambda on, level: -level * on},
+                  guards=(Guard("on", lambda time: 0.503 - time, latch=True),))  # fmt: skip
     found = simulate_plainly(Model(PLANTS["driven_axis"]) + late, COASTING, np.array([3.0, 6.0]))[0]
     np.testing.assert_allclose(found, 0.9 - 2.0 * np.maximum(TIMES - 0.503, 0.0), atol=1e-9)
-
-
-def test_lands_on_kinks_and_carries_added_states() -> None:
-    """Above 0.7 the speed falls exponentially to it and never arrives."""
-    bent = Effect("bent", (Parameter("level", "effort", 0, 9, null=0.0),), {"torque": corner},
-                  (State("way", "m", pace, nothing),), (Guard("edge", at_corner),))  # fmt: skip
+    # Above 0.7 the speed falls exponentially to it and never arrives.
+    bent = Effect("bent", (Parameter("level", "effort", 0, 9, null=0.0),),
+                  {"torque": lambda v, level: -level * np.maximum(v - 0.7, 0.0)},
+                  (State("way", "m", lambda v: v, lambda: 0.0),), (Guard("edge", lambda v: v - 0.7),))  # fmt: skip
     found = simulate_plainly(Model(PLANTS["driven_axis"]) + bent, COASTING, np.array([3.0, 6.0]))[0]
     np.testing.assert_allclose(found, 0.7 + 0.2 * np.exp(-2.0 * TIMES), atol=1e-9)

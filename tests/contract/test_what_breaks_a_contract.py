@@ -82,21 +82,18 @@ def test_an_effect_that_does_not_vanish_at_null_is_found() -> None:
     assert "null law" in failed(check_effect(shaped, AXIS))
 
 
-def test_an_effect_that_does_not_compile_is_found() -> None:
-    assert "compiles" in failed(check_effect(effect(lambda omega, level: level * np.linalg.norm(omega)), AXIS))
-
-
 @pytest.mark.parametrize(("point", "given"), DECLARED.items())
 def test_an_effect_misses_a_point_of_its_declaration(point: str, given: Effect) -> None:
     assert point in failed(check_effect(given, {} if point != "binds" else AXIS))
     assert point != "binds" or "altitude" in failed(check_effect(given, AXIS))["binds"]
 
 
-def test_silence_is_said_and_is_no_fault() -> None:
+def test_silence_is_said_and_is_no_fault_and_what_does_not_compile_is_found() -> None:
     silent = effect(lambda omega, level: -level * omega, states=(State("x", "1", drag, lambda: 0.0),))
     said = next(f for f in check_effect(silent, {}) if f.name == "documented")
     assert said.passed
     assert said.sentence == "no docstring: own__torque, initial__own__x"
+    assert "compiles" in failed(check_effect(effect(lambda omega, level: level * np.linalg.norm(omega)), AXIS))
 
 
 @pytest.mark.slow
@@ -158,10 +155,6 @@ class Beginning(DE):  # type: ignore[misc]
         return found
 
 
-def beginning(first: Callable[[Any], Any]) -> Callable[[int], DE]:
-    return lambda budget: Beginning(first)
-
-
 class Swallowing(DE):  # type: ignore[misc]
     """Differential evolution that takes an error of the problem for an end."""
 
@@ -205,11 +198,8 @@ def test_an_identifier_misses_points() -> None:
     # a start where the global generators say, and one on the far side of the box
     for point, first in (("reproducible", lambda box: box.xl + random.random() * (box.xu - box.xl)),
                          ("inside the box", lambda box: box.xu + 1.0)):  # fmt: skip
-        assert point in failed(check_identifier(as_identifier("own", beginning(first))))
+        assert point in failed(check_identifier(as_identifier("own", lambda budget, first=first: Beginning(first))))
     declared = replace(as_identifier("own", DE), is_stochastic=False)
     assert set(failed(check_identifier(declared))) == {"seed"}
-
-
-def test_an_identifier_that_forgets_its_seed_is_found() -> None:
     missed = set(failed(check_identifier(as_identifier("pattern", lambda budget: PatternSearch()))))
     assert missed & {"reproducible", "survives failures", "survives NaN"}

@@ -3,7 +3,6 @@
 from importlib import import_module
 
 import numpy as np
-import pytest
 from numpy.typing import NDArray
 
 from arm_cases import box_of
@@ -12,7 +11,7 @@ from armid.inference.library import quickly_calibrated
 from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
 
 
-def test_probes_fill_the_box(arm: Model) -> None:
+def test_probes_fill_the_box_and_what_cannot_be_reached_is_said(arm: Model) -> None:
     low, high = box_of(arm)
     spread = (probes(low, high, 200) - low) / (high - low)
     assert spread.shape == (200, 4)
@@ -21,11 +20,14 @@ def test_probes_fill_the_box(arm: Model) -> None:
     for side in spread.T:
         assert np.histogram(side, 10, (0.0, 1.0))[0].min() >= 14
     assert probes(np.empty(0), np.empty(0), 3).shape == (3, 0)
+    axis = Model(PLANTS["driven_axis"])
+    coarse = Manoeuvre(10.0, 30, {"gravity_moment": 4000.0}, {"u": np.sin(np.arange(30.0))})
+    assert not calibrate(axis, coarse, np.array([[1.0]]), "fine").reached
 
 
-def test_a_finer_accuracy_takes_more_steps_and_errors_are_honest(
-    arm: Model, manoeuvres: dict[str, Manoeuvre]
-) -> None:  # fmt: skip
+def test_a_finer_accuracy_takes_more_steps_errors_are_honest_and_a_long_record_is_cut_in_parts(
+    arm, manoeuvres, monkeypatch
+):
     """Within a factor of two of the difference to a much finer run."""
     spread = probes(*box_of(arm))
     standard, fine = (calibrate(arm, manoeuvres["empty"], spread, a, spans=False) for a in ("standard", "fine"))
@@ -33,12 +35,6 @@ def test_a_finer_accuracy_takes_more_steps_and_errors_are_honest(
     assert (standard.reached, fine.reached, fine.error < standard.error) == (True, True, True)
     run, finest = (simulate(arm, manoeuvres["empty"], spread, s).output for s in (standard.schedule, Schedule(24)))
     assert 0.5 <= standard.error / np.abs(run - finest).max() <= 2.0
-
-
-def test_a_long_record_is_calibrated_in_parts(
-    arm: Model, manoeuvres: dict[str, Manoeuvre], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    spread = probes(*box_of(arm))
     whole = calibrate(arm, manoeuvres["lower"], spread, spans=False)
     monkeypatch.setattr(import_module("armid.engine.calibrate"), "MOST_OF_PROBES", 1000)
     parts = calibrate(arm, manoeuvres["lower"], spread)
@@ -46,12 +42,6 @@ def test_a_long_record_is_calibrated_in_parts(
     assert parts.schedule.plan is None
     assert parts.reached
     assert whole.error <= parts.error <= 3.0 * whole.error
-
-
-def test_what_cannot_be_reached_is_said() -> None:
-    axis = Model(PLANTS["driven_axis"])
-    coarse = Manoeuvre(10.0, 30, {"gravity_moment": 4000.0}, {"u": np.sin(np.arange(30.0))})
-    assert not calibrate(axis, coarse, np.array([[1.0]]), "fine").reached
 
 
 def test_long_steps_are_taken_where_candidates_could_try_them(arm: Model, manoeuvres: dict[str, Manoeuvre]) -> None:
@@ -99,7 +89,7 @@ def test_only_rough_samples_are_cut() -> None:
     assert np.array_equal(np.array(alone), simulate(RUBBED, manoeuvre, candidates, schedule, threads=2).output)
 
 
-def test_the_loop_spares_steps_where_friction_asks_for_many() -> None:
+def test_the_loop_spares_steps_where_friction_asks_for_many_and_what_is_cut_changes_smoothly() -> None:
     manoeuvre, candidates = rubbing()
     found = quickly_calibrated(RUBBED, manoeuvre, candidates[:8])
     assert found.reached
@@ -107,11 +97,7 @@ def test_the_loop_spares_steps_where_friction_asks_for_many() -> None:
     run, finest = (simulate(RUBBED, manoeuvre, candidates, s) for s in (found.schedule, Schedule(64)))
     assert run.n_steps < found.schedule.substeps
     assert np.abs(run.output - finest.output).max() < 5e-6 * RUBBED.plant.sizes[0]
-
-
-def test_what_is_cut_where_it_is_rough_changes_smoothly() -> None:
-    """The slope of a misfit along a fine line is the same over a short and a long way."""
-    manoeuvre, candidates = rubbing()
+    # The slope of a misfit along a fine line is the same over a short and a long way.
     schedule = Schedule(8, rough=1e-4 * np.array([1.0] * len(RUBBED.states)))
     line = candidates[0] * (1.0 + 1e-6 * np.arange(400)[:, np.newaxis] * np.array([1.0, -0.7, 0.5, 0.9]))
     record = simulate(RUBBED, manoeuvre, candidates[1], schedule).output[0]

@@ -139,9 +139,7 @@ def test_a_damaged_module_is_written_again(tmp_path: Path, monkeypatch: pytest.M
         assert file.read_bytes() == whole
 
 
-def test_code_that_another_user_may_have_written_is_not_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:  # fmt: skip
+def test_code_that_another_user_may_have_written_is_not_run(tmp_path, monkeypatch):
     """Whatever the type of the entry, and whenever it was put there; the own code takes its place."""
     path, elsewhere = tmp_path / "armid_code_x.bin", tmp_path / "elsewhere"
     elsewhere.mkdir()
@@ -169,8 +167,16 @@ def test_code_that_another_user_may_have_written_is_not_run(
     assert path.exists()
 
 
-def test_the_folder_of_the_cache_is_one_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """What ARMID_CACHE names may be /var/tmp: its permissions and its other files stay as they are."""
+def test_where_the_cache_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("ARMID_CACHE", str(tmp_path))
+    assert cache_folder() == tmp_path / f"armid-{os.getuid()}"
+    monkeypatch.delenv("ARMID_CACHE")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
+    assert cache_folder() == tmp_path / "xdg" / "armid"
+    monkeypatch.delenv("XDG_CACHE_HOME")
+    monkeypatch.setattr(Path, "home", lambda: tmp_path / "home")
+    assert cache_folder() == tmp_path / "home" / ".cache" / "armid"
+    # What ARMID_CACHE names may be /var/tmp: its permissions and its other files stay as they are.
     (tmp_path / "letters.txt").write_text("")
     tmp_path.chmod(0o1777)
     monkeypatch.setenv("ARMID_CACHE", str(tmp_path))
@@ -181,17 +187,6 @@ def test_the_folder_of_the_cache_is_one_of_its_own(tmp_path: Path, monkeypatch: 
     uid = os.getuid()
     monkeypatch.setattr(os, "getuid", lambda: uid + 1)
     assert unusable(tmp_path) == "it is somebody else's"
-
-
-def test_where_the_cache_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("ARMID_CACHE", str(tmp_path))
-    assert cache_folder() == tmp_path / f"armid-{os.getuid()}"
-    monkeypatch.delenv("ARMID_CACHE")
-    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
-    assert cache_folder() == tmp_path / "xdg" / "armid"
-    monkeypatch.delenv("XDG_CACHE_HOME")
-    monkeypatch.setattr(Path, "home", lambda: tmp_path / "home")
-    assert cache_folder() == tmp_path / "home" / ".cache" / "armid"
 
 
 def test_models_run_in_packed_instructions(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -210,7 +205,7 @@ def test_models_run_in_packed_instructions(monkeypatch: pytest.MonkeyPatch) -> N
     assert packed > max(100, 4 * scalar)
 
 
-def test_a_linked_function_is_part_of_those_that_call_it_and_has_no_code_of_its_own():
+def test_a_linked_function_has_no_code_of_its_own_and_what_is_shared_or_rare_stays_a_call():
     inner = numba.njit(**LINKED)(lambda x: 2.0 * x + 1.0)
     middle = numba.njit(**LINKED)(lambda x: inner(x) ** 2)
     outer = numba.njit(lambda x: middle(x) + inner(x))
@@ -219,10 +214,7 @@ def test_a_linked_function_is_part_of_those_that_call_it_and_has_no_code_of_its_
         (compiled,) = function.overloads.values()
         assert isinstance(compiled.library, LinkedLibrary)
         assert not compiled.library.codegen._engine.is_symbol_defined(compiled.fndesc.mangled_name)
-
-
-def test_what_is_shared_or_rare_stays_a_call_in_a_function_that_is_written_inline():
-    """Numba hands the option of a caller on to what it calls, which made a model many times as large."""
+    # Numba hands the option of a caller on to what it calls, which made a model many times as large.
     shared, rare = numba.njit(**LINKED, forceinline=False)(lambda x: 2.0 * x + 1.0), numba.njit(**RARE)(lambda x: x**2)
     caller = numba.njit(**LINKED, forceinline=True)(lambda x: shared(x) + rare(x))
     outer = numba.njit(lambda x: caller(x) + 1.0)

@@ -77,22 +77,11 @@ def test_a_recorded_input_is_shifted_with_its_hold(hold):
         np.testing.assert_array_equal(simulate(model, manoeuvre, candidate, Schedule(4)).output[0], signal)
 
 
-def late_spring(late_way, late_pace, stiffness):
-    """Torque of a control that sees position and speed late."""
-    return -stiffness * (late_way + 0.1 * late_pace)
-
-
-def way(theta):
-    return theta
-
-
-def pace(omega):
-    return omega
-
-
+# Of a control that sees position and speed late.
 SPRING = Effect(
     "spring", (Parameter("stiffness", "1", 0.0, 100.0), Parameter("delay", "s", 0.0, 0.1, null=0.0)),
-    {"torque": late_spring}, delays=(Delay("late_way", way, "delay"), Delay("late_pace", pace, "delay")),
+    {"torque": lambda late_way, late_pace, stiffness: -stiffness * (late_way + 0.1 * late_pace)},
+    delays=(Delay("late_way", lambda theta: theta, "delay"), Delay("late_pace", lambda omega: omega, "delay")),
 )  # fmt: skip
 
 
@@ -134,20 +123,12 @@ def test_a_late_control_moves_the_arm_as_on_the_test_stand(stroke, wide, manoeuv
     for i, delay in enumerate(delays):
         stood = simulate_on_stand(Motion(Arm(*plain.values()), KNOWN[stroke], Effects(controller_delay=delay)), 1.2)
         assert np.abs(found[i] - stood.gyro).max() <= 2e-8
-        np.testing.assert_array_equal(
-            simulate(wide, manoeuvres[stroke], population[i], Schedule(4)).output[0], found[i]
-        )
+        alone = simulate(wide, manoeuvres[stroke], population[i], Schedule(4)).output[0]
+        np.testing.assert_array_equal(alone, found[i])
     # the filter, tried alone by tests/contract too, comes near to the dead time and is not it
     filtered = Model(wide.plant) + EFFECTS["controller_delay"].in_form("feedback_filter")
-    missed = (
-        found
-        - simulate(
-            filtered,
-            manoeuvres[stroke],
-            candidates(filtered, [plain | {"controller_delay.delay": d} for d in delays]),
-            Schedule(4),
-        ).output
-    )
+    rows = [plain | {"controller_delay.delay": d} for d in delays]
+    missed = found - simulate(filtered, manoeuvres[stroke], candidates(filtered, rows), Schedule(4)).output
     assert np.abs(missed[0]).max() < 1e-9
     assert 1e-4 < np.abs(missed[-1]).max() < 1e-2
 
@@ -172,9 +153,11 @@ def test_a_piece_sees_what_drove_the_machine_before_it():
 
 def test_what_is_late_of_a_late_signal_is_late_by_both():
     """The second effect delays a quantity that the first one makes late."""
+    # The sensor adds what is late less what is there, of the effort of drive and effects.
     model = Model(AXIS) + EFFECTS["drive_delay"] + Effect(
-        "sensor", (Parameter("delay", "s", 0.0, 0.1, null=0.0),), {"output": late_drive_seen},
-        delays=(Delay("late", drive_seen, "delay"),),
+        "sensor", (Parameter("delay", "s", 0.0, 0.1, null=0.0),),
+        {"output": lambda late, drive_effort, drive: late - (drive_effort + drive)},
+        delays=(Delay("late", lambda drive_effort, drive: drive_effort + drive, "delay"),),
     )  # fmt: skip
     manoeuvre = Manoeuvre(STEP_S, N_SAMPLES, {"start_speed": 0.0}, {"u": DRIVE}, "zero")
     values = {"mass": MASS, "drive_delay.delay": 0.0061, "sensor.delay": 0.0071}
@@ -183,23 +166,6 @@ def test_what_is_late_of_a_late_signal_is_late_by_both():
     moved = DRIVE[np.maximum(np.floor((places - 0.0132) / STEP_S + 1e-9).astype(int), 0)] - DRIVE[
         np.maximum(np.floor((places - 0.0061) / STEP_S + 1e-9).astype(int), 0)]  # fmt: skip
     np.testing.assert_allclose(found - plain, moved, atol=1e-12)
-
-
-def late_drive_seen(late, drive_effort, drive):
-    """What is late less what is there, of the effort of drive and effects."""
-    return late - (drive_effort + drive)
-
-
-def drive_seen(drive_effort, drive):
-    return drive_effort + drive
-
-
-def after(on, level):
-    return level * on
-
-
-def still(time):
-    return 0.1 - time
 
 
 def test_what_is_no_delay():
@@ -212,16 +178,13 @@ def test_what_is_no_delay():
     np.testing.assert_array_equal(run.output[0], run.output[1])
     assert run.failed.tolist() == [False, False, True]
     with pytest.raises(ArmidError, match="delays 'late' by 'wait', which is not a parameter of it"):
-        replace(EFFECTS["output_delay"], delays=(Delay("late", way, "wait"),))
+        replace(EFFECTS["output_delay"], delays=(Delay("late", lambda theta: theta, "wait"),))
     strengths = Parameter("level", "effort", 0, 9, null=0.0), Parameter("wait", "s", 0, 1, null=0.0)
-    switching = Effect("switching", strengths, {"torque": late_switch}, (), (Guard("on", still, latch=True),),
-                       delays=(Delay("late", after, "wait"),))  # fmt: skip
+    switching = Effect("switching", strengths, {"torque": lambda late: late}, (),
+                       (Guard("on", lambda time: 0.1 - time, latch=True),),
+                       delays=(Delay("late", lambda on, level: level * on, "wait"),))  # fmt: skip
     with pytest.raises(ArmidError, match=r"effect 'switching' delays what depends on the switch 'switching\.on'"):
         Model(AXIS) + switching
-
-
-def late_switch(late):
-    return late
 
 
 def test_one_effect_under_two_names_is_looked_for_once():

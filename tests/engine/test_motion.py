@@ -56,7 +56,7 @@ def test_the_speed_is_that_of_the_closed_form(axis: Model, case: str) -> None:
     np.testing.assert_allclose(move(axis, drive, **options).output[0], expected, rtol=relative, atol=absolute)
 
 
-def test_coulomb_friction_stops_the_mass_and_leaves_it_there(axis: Model) -> None:
+def test_coulomb_friction_stops_the_mass_for_good_and_a_pendulum_swings_as_its_small_angle_says(axis: Model) -> None:
     """From v0 the mass slows down by level / m and stands from m v0 / level on, but for the smoothing."""
     level, start = 4.0, 0.9
     found = move(axis, np.zeros(N_SAMPLES), level=level, substeps=32, start_speed=start)
@@ -65,9 +65,6 @@ def test_coulomb_friction_stops_the_mass_and_leaves_it_there(axis: Model) -> Non
     assert np.abs(found.output[0] - expected).max() <= 0.015
     assert np.abs(found.output[0][stop + 0.1 < TIMES]).max() <= 1e-6
     assert found.output[0].min() >= -1e-9
-
-
-def test_a_pendulum_swings_as_its_small_angle_says(axis: Model) -> None:
     found = move(axis, np.zeros(N_SAMPLES), gravity_moment=120.0, start_position=1e-4)
     rate = np.sqrt(120.0 / MASS)
     np.testing.assert_allclose(found.states["q"][0], 1e-4 * np.cos(rate * TIMES), atol=1e-11)
@@ -98,22 +95,12 @@ N_SWITCHED, OFF = 101, 40
 SWITCHED = INTERVAL * np.arange(N_SWITCHED)
 
 
-def speed_rate(push, on, mass):
-    return push * on / mass
-
-
-def at_rest():
-    return 0.0
-
-
-def recorded(v, on):
-    return v + 0.5 * on
-
-
 CART = Plant(
-    name="cart", parameters=(Parameter("mass", "kg", 0.5, 2.0),), states=(State("v", "m/s", speed_rate, at_rest),),
-    quantities={"recorded": recorded}, inputs=(Input("push", "N"), Input("on", "1", hold="zero")), output="recorded",
-    output_unit="m/s", scales=Scales(1.0, 1.0, "N", "m"), from_rest=False,
+    name="cart", parameters=(Parameter("mass", "kg", 0.5, 2.0),),
+    inputs=(Input("push", "N"), Input("on", "1", hold="zero")),
+    states=(State("v", "m/s", lambda push, on, mass: push * on / mass, lambda: 0.0),), from_rest=False,
+    quantities={"recorded": lambda v, on: v + 0.5 * on}, output="recorded", output_unit="m/s",
+    scales=Scales(1.0, 1.0, "N", "m"),
 )  # fmt: skip
 INPUTS = {"push": SWITCHED, "on": np.where(np.arange(N_SWITCHED) < OFF, 1.0, 0.0)}
 
@@ -126,7 +113,7 @@ def test_a_switch_jumps_at_its_sample_and_a_force_does_not(substeps):
     np.testing.assert_allclose(found, speed + 0.5 * INPUTS["on"], atol=1e-14)
 
 
-def test_what_the_plant_says_of_an_input_wins():
+def test_what_the_plant_says_of_an_input_wins_unless_it_contradicts_itself():
     straight = replace(CART, inputs=(Input("push", "N", hold="linear"), Input("on", "1", hold="zero")))
     told = [
         simulate(Model(plant), Manoeuvre(INTERVAL, N_SWITCHED, inputs=INPUTS, hold=hold), [[1.0]]).output[0]
@@ -135,6 +122,10 @@ def test_what_the_plant_says_of_an_input_wins():
     np.testing.assert_array_equal(told[0], told[1])
     stairs = np.cumsum(np.append(0.0, (SWITCHED * INPUTS["on"])[:-1])) * INTERVAL
     np.testing.assert_allclose(told[2], stairs + 0.5 * INPUTS["on"], atol=1e-14)
+    with pytest.raises(ArmidError, match=r"'stairs'.*'linear', 'zero' or ''"):
+        Input("u", "N", hold="stairs")
+    with pytest.raises(ArmidError, match="a smaller and a larger value"):
+        Input("u", "N", typical=(1.0, 1.0))
 
 
 @pytest.mark.parametrize("hold", ["linear", "zero"])
@@ -142,10 +133,3 @@ def test_the_plain_reference_holds_alike(hold):
     manoeuvre = Manoeuvre(INTERVAL, 60, inputs={k: v[:60] for k, v in INPUTS.items()}, hold=hold)
     plain = simulate_plainly(Model(CART), manoeuvre, np.array([1.3]))[0]
     np.testing.assert_allclose(simulate(Model(CART), manoeuvre, [[1.3]]).output[0], plain, atol=1e-9)
-
-
-def test_an_input_that_contradicts_itself_is_refused():
-    with pytest.raises(ArmidError, match=r"'stairs'.*'linear', 'zero' or ''"):
-        Input("u", "N", hold="stairs")
-    with pytest.raises(ArmidError, match="a smaller and a larger value"):
-        Input("u", "N", typical=(1.0, 1.0))

@@ -42,9 +42,7 @@ def check(found: Simulation, stood: list[tuple[Array, float | None] | None], all
 
 
 @pytest.mark.parametrize("row", index_rows(), ids=lambda row: row["file"])
-def test_agrees_with_the_reference_and_the_test_stand(
-    row: dict[str, str], arm: Model, manoeuvres: dict[str, Manoeuvre], schedule_for: ScheduleFor
-) -> None:
+def test_agrees_with_the_reference_and_the_test_stand(row, arm, manoeuvres, schedule_for):
     expected = np.loadtxt(REFERENCE / row["file"], delimiter=",", skiprows=1)[:, 2]
     manoeuvre, candidate = manoeuvres[row["manoeuvre"]], candidate_of(row)
     # In company: a candidate among others must come out as right as alone.
@@ -68,9 +66,7 @@ def test_what_is_integrated_in_place_of_powers_and_cosines_stays_equal_to_them(a
 
 
 @pytest.mark.slow
-def test_random_candidates_agree_with_the_test_stand(
-    arm: Model, manoeuvres: dict[str, Manoeuvre], schedule_for: ScheduleFor
-) -> None:
+def test_random_candidates_agree_with_the_test_stand(arm, manoeuvres, schedule_for):
     candidates = drawn(arm, N_CANDIDATES, SEED)
     left = 0
     for k, (name, manoeuvre) in enumerate(manoeuvres.items()):
@@ -87,9 +83,7 @@ def test_random_candidates_agree_with_the_test_stand(
 
 @pytest.mark.slow
 @pytest.mark.parametrize("width", [0.01, 0.001])
-def test_friction_agrees_with_the_test_stand(
-    width: float, rubbing_arm: Model, manoeuvres: dict[str, Manoeuvre]
-) -> None:
+def test_friction_agrees_with_the_test_stand(width, rubbing_arm, manoeuvres):
     """However narrow the smoothing of the sign: the schedule follows."""
     low, high = box_of(rubbing_arm)
     low[5] = high[5] = width

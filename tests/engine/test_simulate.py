@@ -11,6 +11,7 @@ import pytest
 from arm_cases import Array, drawn
 from armid.contract.trials import PlainModel
 from armid.engine import Schedule, Simulation, along, simulate
+from armid.engine.generate import FEWEST_IDLE, strengths_of
 from armid.errors import ArmidError
 from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
 from armid.problem.fitness import mean_square
@@ -20,7 +21,7 @@ AXIS = Model(PLANTS["driven_axis"])
 TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])
 
 
-def test_shapes(arm: Model) -> None:
+def test_shapes_and_that_a_switch_that_is_never_reached_has_no_time(arm: Model) -> None:
     found = simulate(arm, Manoeuvre(0.001, 60), drawn(arm, 11, 1), states=True)
     assert found.output.shape == (11, 60)
     assert found.failed.shape == found.switch_times["closed"].shape == (11,)
@@ -33,6 +34,9 @@ def test_shapes(arm: Model) -> None:
     one, row = (simulate(arm, Manoeuvre(0.001, 60), c).output for c in (candidate[0], candidate))
     assert np.array_equal(one, row)
     assert np.array_equal(simulate(arm, Manoeuvre(0.001, 1), drawn(arm, 3, 1)).output, np.zeros((3, 1)))
+    # A supply too weak to lift: no switch, and no time of one.
+    weak = Manoeuvre(0.001, 200, {"U": 1.0, "theta_C": 0.3, "theta_D": -0.8})
+    assert np.isnan(simulate(arm, weak, drawn(arm, 3, 1)).switch_times["closed"]).all()
 
 
 @pytest.mark.parametrize("plan", [None, np.full(899, 4)], ids=["no plan", "a plan of another length"])
@@ -40,12 +44,6 @@ def test_more_samples_do_not_change_the_first(arm: Model, plan: Array | None) ->
     population = drawn(arm, 5, 3)
     short, long = (simulate(arm, Manoeuvre(0.001, n), population, Schedule(plan=plan)).output for n in (301, 900))
     assert np.array_equal(short, long[:, :301])
-
-
-def test_the_arm_parks_when_the_switch_is_never_reached(arm: Model) -> None:
-    """A supply too weak to lift: no switch, and no time of one."""
-    weak = Manoeuvre(0.001, 200, {"U": 1.0, "theta_C": 0.3, "theta_D": -0.8})
-    assert np.isnan(simulate(arm, weak, drawn(arm, 3, 1)).switch_times["closed"]).all()
 
 
 def test_refused(arm: Model) -> None:
@@ -62,12 +60,6 @@ def test_refused(arm: Model) -> None:
 
 
 @pytest.fixture(scope="module")
-def pushed_arm(arm: Model) -> Model:
-    """What drives it may grow with its speed: friction below 0 makes it run away."""
-    return arm + EFFECTS["viscous"]
-
-
-@pytest.fixture(scope="module")
 def schedule(schedule_for: Callable[[str, str], Schedule]) -> Schedule:
     return schedule_for("lower", "standard")
 
@@ -79,9 +71,7 @@ def same(found: Simulation, rows: Array | slice, expected: Simulation) -> bool:
     return all(np.array_equal(a[rows], b, equal_nan=True) for a, b in pairs)
 
 
-def test_neighbours_threads_and_weights_change_no_bit(
-    arm: Model, manoeuvres: dict[str, Manoeuvre], schedule: Schedule
-) -> None:
+def test_neighbours_threads_and_weights_change_no_bit(arm, manoeuvres, schedule):
     population = drawn(arm, 50, 21)
     whole = simulate(arm, manoeuvres["lower"], population, schedule)
     for i in (0, 7, 8, 49):
@@ -97,9 +87,8 @@ def test_neighbours_threads_and_weights_change_no_bit(
         assert same(whole, slice(None), other)
 
 
-def test_a_diverged_candidate_is_nan_from_then_on_and_harms_no_other(
-    pushed_arm: Model, manoeuvres: dict[str, Manoeuvre]
-) -> None:  # fmt: skip
+def test_a_diverged_candidate_is_nan_from_then_on_and_harms_no_other(manoeuvres, arm: Model):
+    pushed_arm = arm + EFFECTS["viscous"]
     calm = np.column_stack([drawn(pushed_arm, 20, 25)[:, :4], np.zeros(20)])
     wild = np.column_stack([drawn(pushed_arm, 30, 26)[:, :4], -np.geomspace(1e3, 1e7, 30)])
     order = np.random.default_rng(1).permutation(50)
@@ -181,10 +170,7 @@ def central(values: Array, points: int) -> Array:
 
 @pytest.mark.parametrize("accuracy", ["standard", "fine"])
 @pytest.mark.parametrize("name", ["lower", "raise"])
-def test_derivatives_at_two_steps_agree(
-    name: str, accuracy: str, arm: Model, manoeuvres: dict[str, Manoeuvre],
-    schedule_for: Callable[[str, str], Schedule],
-) -> None:  # fmt: skip
+def test_derivatives_at_two_steps_agree(name, accuracy, arm, manoeuvres, schedule_for):
     schedule = schedule_for(name, accuracy)
     record = simulate(arm, manoeuvres[name], TRUTH, schedule).output[0]
     for direction, start in product(DIRECTIONS, drawn(arm, 2, 11)):
@@ -194,3 +180,55 @@ def test_derivatives_at_two_steps_agree(
         counted = np.abs(wide) >= 0.1 * np.median(np.abs(wide))
         assert counted.mean() > 0.5
         assert np.max(np.abs(narrow - wide)[counted] / np.abs(wide)[counted]) <= DISAGREEMENT, direction
+
+
+# Those that are tried, of all that one compiled model holds.
+NAMES = ("coulomb", "viscous", "tilt", "gas_heat_loss", "gyro_lag", "shell_rocking", "controller_delay", "gyro_bias")
+
+
+@pytest.fixture(scope="module")
+def unweighted(schedule_for: Callable[[str, str], Schedule]) -> Schedule:
+    return replace(schedule_for("lower", "standard"), weights=None)
+
+
+def using(wide: Model, plain: Array, name: str, share: float = 0.3) -> Array:
+    """Return a candidate that uses one effect, every other at its null."""
+    values = dict(zip(list(wide.parameters)[: len(plain)], plain, strict=True))
+    for key, p in list(wide.parameters.items())[len(plain) :]:
+        rest = next(v for v in (p.null, p.fixed, p.nominal, 0.5 * (p.low + p.high)) if v is not None)
+        in_use = key.startswith(f"{name}.") and p.null is not None
+        values[key] = p.null + share * (p.high - p.null) if in_use else rest
+    return np.array(list(values.values()))
+
+
+@pytest.mark.slow
+def test_a_small_model_evaluates_every_effect_and_the_motion_is_that_without_what_is_inactive(
+    arm: Model, wide: Model, rubbing_arm, manoeuvres, unweighted
+) -> None:
+    assert len(NAMES) == FEWEST_IDLE
+    least = Model(arm.plant, tuple(EFFECTS[n] for n in NAMES))
+    assert not strengths_of(Model(arm.plant, least.effects[1:]))
+    assert set(strengths_of(least)) == set(NAMES) < set(strengths_of(wide))
+    # The plant alone, and with two effects, few enough that both are evaluated.
+    # A delay of 0 switches at once, and behind a switch no step is long: only even steps are the same.
+    even = replace(unweighted, plan=None)
+    for name, small in (("", arm), ("coulomb", rubbing_arm), ("viscous", rubbing_arm)):
+        candidate = using(wide, drawn(arm, 1, 8)[0], name)
+        values = dict(zip(wide.parameters, candidate))
+        expected = simulate(small, manoeuvres["lower"], [values[n] for n in small.parameters], even).output
+        found = simulate(wide, manoeuvres["lower"], candidate, even).output
+        np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.slow
+def test_neighbours_that_use_other_effects_change_nothing(arm, wide, manoeuvres, unweighted):
+    plain = drawn(arm, 1, 7)[0]
+    population = np.array([using(wide, plain, n) for n in (*NAMES, "", *NAMES[::-1])])
+    together = simulate(wide, manoeuvres["lower"], population, unweighted).output
+    for candidate, output in zip(population, together, strict=True):
+        np.testing.assert_array_equal(simulate(wide, manoeuvres["lower"], candidate, unweighted).output[0], output)
+    assert len(np.unique(together.round(9), axis=0)) == len(NAMES) + 1
+    # a strength that is no number is not taken for the null
+    candidate = using(wide, plain, "")
+    candidate[list(wide.parameters).index("viscous.slope")] = np.nan
+    assert simulate(wide, manoeuvres["lower"], candidate, unweighted).failed.all()

@@ -1,15 +1,17 @@
 """A user's functions in the generated module: what can be written, and that it computes the same as in Python."""
 
+import functools
+import random
 from collections.abc import Callable
 from typing import Any
 
 import equations_of_a_user as user
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from armid.engine import Schedule, Simulation, simulate
 from armid.engine.transpile import SourceText
+from armid.errors import ArmidError
 from armid.model import PLANTS, Effect, Guard, Manoeuvre, Model, Parameter, Plant, Scales, State
 
 ALL = [*user.VECTOR, *user.BY_LANE]
@@ -21,26 +23,12 @@ def one():
     return 1.0
 
 
-def begin():
-    """Start before 0, so that the speed runs through it."""
-    return -0.5
-
-
-def recorded(output):
-    """What the effects add, and nothing else."""
-    return output
-
-
+# It starts before 0, so that the speed runs through it, and records what the effects add, and nothing else.
 ramp = Plant(
-    name="ramp",
-    parameters=(Parameter("unused", "1", 0.0, 1.0),),
-    states=(State("omega", "rad/s", one, begin),),
-    quantities={"recorded": recorded},
-    output="recorded",
-    output_unit="rad/s",
-    ports={"output": "rad/s"},
-    scales=Scales(effort=1.0, speed=1.0),
-)
+    name="ramp", parameters=(Parameter("unused", "1", 0.0, 1.0),), ports={"output": "rad/s"},
+    states=(State("omega", "rad/s", one, lambda: -0.5),), scales=Scales(effort=1.0, speed=1.0),
+    quantities={"recorded": lambda output: output}, output="recorded", output_unit="rad/s",
+)  # fmt: skip
 
 
 def name_of(function: Callable[..., Any]) -> str:
@@ -59,18 +47,14 @@ def found() -> Simulation:
     return simulate(Model(ramp, effects), Manoeuvre(1 / 64, N_SAMPLES), population, Schedule(), states=True)
 
 
-def rows_of(found: Simulation, function: Callable[..., Any]) -> NDArray[np.float64]:
-    """What the engine makes of an equation, (n_levels, n_samples)."""
-    i = ALL.index(function)
-    return found.output[i * len(LEVELS) : (i + 1) * len(LEVELS)]
-
-
 @pytest.mark.parametrize("function", ALL, ids=name_of)
 def test_computes_the_same_as_python(function: Callable[..., Any], found: Simulation) -> None:
     speeds = found.states["omega"][0]
     assert np.array_equal(speeds, -0.5 + np.arange(N_SAMPLES) / 64)
     expected = [[float(function(float(w), float(level))) for w in speeds] for level in LEVELS]
-    np.testing.assert_allclose(rows_of(found, function), expected, rtol=1e-14, atol=1e-15)
+    i = ALL.index(function)
+    made = found.output[i * len(LEVELS) : (i + 1) * len(LEVELS)]
+    np.testing.assert_allclose(made, expected, rtol=1e-14, atol=1e-15)
 
 
 def test_runs_lane_by_lane_only_where_it_must() -> None:
@@ -90,26 +74,9 @@ def with_names_of_the_loop(h, np, math, i, lane, k1_x, result):
     return h + 8 * np + math**2 + i + lane + k1_x + result
 
 
-def on_lanes(np, abs, span, x):
-    return np**2 * (1.0 if abs > 0.0 else span) + x
-
-
 def falls(h):
     """A guard, so that the part which cuts steps is there too."""
     return h - 0.2
-
-
-def waits(clock):
-    return 0.5 - clock
-
-
-def after(on, clock, level):
-    """Nothing before the switch, then in proportion to the time since."""
-    return level * on * (clock - 0.5)
-
-
-def zero():
-    return 0.0
 
 
 @pytest.mark.slow
@@ -119,9 +86,13 @@ def test_names_of_the_loop_numpy_and_builtins_and_an_own_clock_and_switch_can_be
     parameters = (Parameter("x", "1", 0.0, 1.0, null=0.0), Parameter("time_of", "1", 0.0, 1.0))
     odd = Effect("odd", parameters, {"output": with_names_of_the_loop}, states, guards)
     few = tuple(State(n, "1", one, one) for n in ("np", "abs", "span"))
-    more = Effect("more", (Parameter("x", "1", 0.0, 1.0, null=0.0),), {"output": on_lanes}, few)
-    late = Effect("late", (Parameter("level", "1", 0.0, 1.0, null=0.0),), {"output": after},
-                  (State("clock", "s", one, zero),), (Guard("on", waits, latch=True),))  # fmt: skip
+    more = Effect("more", (Parameter("x", "1", 0.0, 1.0, null=0.0),),
+                  {"output": lambda np, abs, span, x: np**2 * (1.0 if abs > 0.0 else span) + x}, few)  # fmt: skip
+    # nothing before the switch, then in proportion to the time since
+    late = Effect("late", (Parameter("level", "1", 0.0, 1.0, null=0.0),),
+                  {"output": lambda on, clock, level: level * on * (clock - 0.5)},
+                  (State("clock", "s", one, lambda: 0.0),),
+                  (Guard("on", lambda clock: 0.5 - clock, latch=True),))  # fmt: skip
     candidates = [[0.0, 0.0, 0.5, 0.25, level] for level in (0.0, 2.0)]
     found = simulate(Model(ramp) + odd + more + late, Manoeuvre(0.03, 41), candidates, states=True)
     times = 0.03 * np.arange(41)
@@ -144,3 +115,90 @@ def test_selections_work_on_plain_numbers_too() -> None:
     rest = Manoeuvre(0.01, 11, {"gain": 2.0}, {"u": np.zeros(11)})
     found = simulate(Model(PLANTS["driven_axis"]) + push, rest, [[1.0, 0.0]])
     np.testing.assert_allclose(found.output[0], (1.0 + 3.0 + 2.0 + 10.0 + 2.0) * 0.01 * np.arange(11), atol=1e-12)
+
+
+MANOEUVRE = Manoeuvre(0.01, 20, inputs={"u": np.ones(20)})
+TABLE = {"a": 1.0}
+
+
+def itself(omega, level):
+    """Call itself."""
+    return itself(omega, level)
+
+
+def unknown_object(omega, level):
+    return TABLE["a"] * omega * level
+
+
+def nothing_returned(omega, level):
+    omega + level
+
+
+def odd_default(omega, level, table=TABLE):
+    return omega * level
+
+
+def sometimes_nothing(omega, level):
+    if omega > 0:
+        return None
+    return level
+
+
+def imports(omega, level):
+    import math
+
+    return math.sin(omega) * level
+
+
+def plain(omega, level):
+    return -omega * level
+
+
+class Owner:
+    """Something with a method."""
+
+    def method(self, omega, level):
+        return -omega * level
+
+
+typed: dict[str, Any] = {}
+exec("def typed_in(omega, level): return -omega * level", typed)
+
+TOLD = {
+    "or": (lambda omega, level: -level / (omega or 1e-9),
+            "'omega or 1e-09' joins numbers by `or`: conditions are expected"),
+    "calls itself": (itself, "the equation itself calls itself: write it as a loop"),
+    "object": (unknown_object, r"the equation unknown_object uses 'TABLE' \(dict\), which cannot be compiled: numpy"),
+    "module": (lambda omega, level: random.random() * level, r"uses 'random' \(module\), which cannot be compiled"),
+    "builtin": (lambda omega, level: sorted([omega, level]), "uses 'sorted', which cannot be compiled"),
+    "no return": (nothing_returned, "the equation nothing_returned returns nothing: a number is expected"),
+    "default": (odd_default, "the equation odd_default has the default {'a': 1.0}: a number is expected"),
+    "no source": (typed["typed_in"], "the source of the equation typed_in cannot be read: define it in a file"),
+    "partial": (functools.partial(plain), "is not a plain Python function: write it as a def"),
+    "method": (Owner().method, "the equation Owner.method is not a plain Python function: write it as a def"),
+}  # fmt: skip
+COMPILED = {
+    "arrays": (lambda omega, level: level * np.linalg.norm(omega),
+               r"the equation 'bad.torque' cannot be compiled \(numba has no norm\(float64\)\): numpy"),
+    "import": (imports, r"the equation 'bad.torque' cannot be compiled \(numba: Use of unsupported opcode"),
+    "None": (sometimes_nothing, r"the equation 'bad.torque' cannot be compiled \(it does not return a number in every"),
+}  # fmt: skip
+
+
+def refused(function: Callable[..., Any], sentence: str) -> ArmidError:
+    bad = Effect("bad", (Parameter("level", "effort", 0, 1, null=0.0),), {"torque": function})
+    with pytest.raises(ArmidError, match=sentence) as caught:
+        simulate(Model(PLANTS["driven_axis"]) + bad, MANOEUVRE, [[1.0, 0.1]])
+    assert "\n" not in str(caught.value)
+    return caught.value
+
+
+@pytest.mark.parametrize(("function", "sentence"), TOLD.values(), ids=TOLD)
+def test_what_cannot_be_written_down(function: Callable[..., Any], sentence: str) -> None:
+    refused(function, sentence)
+
+
+@pytest.mark.parametrize(("function", "sentence"), COMPILED.values(), ids=COMPILED)
+def test_what_numba_cannot_compile(function: Callable[..., Any], sentence: str) -> None:
+    error = refused(function, sentence)
+    assert error.__cause__ is not None, "the cause must not be lost"

@@ -1,7 +1,7 @@
 """SYNTHETIC campaigns of library plants, with friction that none of them declares."""
 
-from collections.abc import Callable, Mapping
-from functools import partial
+from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -31,16 +31,29 @@ def link(x: Array, u: float, friction: float) -> Array:
     return np.array([x[1], a, x[3], -couple / 0.02 - a])
 
 
+RATES = {"rotary_arm": arm, "driven_axis": axis, "flexible_link": link}
+
+
+@cache
+def motion(
+    name: str, file: str, friction: float, interval: float, size: float, start: tuple[float, ...]
+) -> tuple[Array, ...]:
+    """Return times, drive and states of a file: many tests want the same ones."""
+    seconds, pace = STROKES[file]
+    times = np.arange(0.0, seconds, interval)
+    u = size * (0.7 * np.sin(3.0 * pace * times) + 0.4 * np.sin(7.1 * pace * times + 0.5))
+    rates, substeps = RATES[name], 8 if name == "flexible_link" else 1
+    return times, u, moved(lambda x, v: rates(x, v, friction), u, interval, start, substeps=substeps)
+
+
 def written(
-    folder: Path, name: str, rates: Callable[..., Array], interval: float, start: tuple[float, ...],
-    drive: tuple[str, float], columns: Mapping[str, tuple[int, float, float]],
+    folder: Path, name: str, friction: float, interval: float, start: tuple[float, ...], drive: tuple[str, float],
+    columns: Mapping[str, tuple[int, float, float]],
 ) -> Path:  # fmt: skip
     """Write a campaign. drive: its column and size; columns: header -> state, its size in SI, its noise in its unit."""
     tables, rng = {}, np.random.default_rng(1)
-    for file, (seconds, pace) in STROKES.items():
-        times = np.arange(0.0, seconds, interval)
-        u = drive[1] * (0.7 * np.sin(3.0 * pace * times) + 0.4 * np.sin(7.1 * pace * times + 0.5))
-        states = moved(rates, u, interval, start, substeps=8 if name == "flexible_link" else 1)
+    for file in STROKES:
+        times, u, states = motion(name, file, friction, interval, drive[1], start)
         tables[file] = {"time_s": times, drive[0]: u}
         for header, (place, size, noise) in columns.items():
             tables[file][header] = states[:, place] / size + rng.normal(0.0, noise, times.size)
@@ -52,14 +65,14 @@ def write_arm(folder: Path, friction: float = 0.0, outputs: str = "angle", inter
     """Write a rotary arm; outputs: "angle", "speed" or "both"; noise: times 0.1 deg and 1 deg/s."""
     columns = {"angle_deg": (0, DEGREE, 0.1 * noise), "angular_velocity_deg_s": (1, DEGREE, noise)}
     columns.pop({"angle": "angular_velocity_deg_s", "speed": "angle_deg"}.get(outputs, ""), None)
-    return written(folder, "rotary_arm", partial(arm, friction=friction), interval, (0.1, 0.0), ("drive_N_m", size),
+    return written(folder, "rotary_arm", friction, interval, (0.1, 0.0), ("drive_N_m", size),
                    columns)  # fmt: skip
 
 
 def write_axis(folder: Path, friction: float = 0.0, position: bool = True) -> Path:
     """Write a linear axis with its speed (noise of 2 mm/s) and, if wished, its position."""
     columns = {"velocity_m_s": (1, 1.0, 0.002)} | ({"position_m": (0, 1.0, 2e-4)} if position else {})
-    return written(folder, "driven_axis", partial(axis, friction=friction), 0.004, (0.02, 0.0), ("drive_N", 4.0),
+    return written(folder, "driven_axis", friction, 0.004, (0.02, 0.0), ("drive_N", 4.0),
                    columns)  # fmt: skip
 
 
@@ -69,5 +82,5 @@ def write_link(folder: Path, friction: float = 0.0, outputs: tuple[str, ...] = (
     states = {"hub_angle_deg": (0, 0.1), "hub_speed_deg_s": (1, 1.0), "deflection_deg": (2, 0.05),
               "deflection_speed_deg_s": (3, 1.0)}  # fmt: skip
     columns = {name: (states[name][0], DEGREE, states[name][1] * noise) for name in outputs}
-    return written(folder, "flexible_link", partial(link, friction=friction), 0.008, (0.0,) * 4, ("drive_N_m", 1.5),
+    return written(folder, "flexible_link", friction, 0.008, (0.0,) * 4, ("drive_N_m", 1.5),
                    columns)  # fmt: skip

@@ -173,13 +173,9 @@ def test_advice_on_the_arm(rivals):
     assert advice[0].words != "lower.csv once more"
 
 
-@pytest.fixture(scope="module")
-def some(rivals):
+def test_a_louder_sensor_tells_less_apart_and_twins_nothing_does(rivals):
     (replay,) = rivals[0].records.replays
-    return manoeuvre_grid(replay.model, [replay.record])[5::30]
-
-
-def test_a_louder_sensor_tells_less_apart_and_twins_nothing_does(rivals, some):
+    some = manoeuvre_grid(replay.model, [replay.record])[5::30]
     with pytest.raises(ArmidError, match="1 model was given: at least two are expected"):
         advise(rivals[:1], whitening(rivals))
     twin = replace(rivals[1], name="twin")
@@ -218,10 +214,10 @@ def test_the_largest_set_that_is_told_apart_is_named(rivals):
 
 @pytest.mark.slow
 def test_the_advised_record_tells_apart_and_beats_a_random_one(models, stroke):
-    """One stroke leaves friction open. Make the advised record, and a random one, 6 times: fit both rivals again."""
+    """One stroke leaves friction open. Make the advised record, and a random one, 4 times: fit both rivals again."""
     rng = np.random.default_rng(7)
     margins = {"advised": [], "random": []}
-    for turn in range(6):
+    for turn in range(4):
         right = ("coulomb", "viscous")[turn % 2]
         old = made(models[right], stroke, slice(0, 701), rng, "lower.csv")
         rivals = [fitted(name, model, [old]) for name, model in models.items()]

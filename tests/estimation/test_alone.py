@@ -69,7 +69,7 @@ def test_an_error_of_the_problem_comes_out(posed, monkeypatch, name) -> None:
         assert after == [1]
 
 
-def test_it_ends_at_the_target_where_minimize_does(posed) -> None:
+def test_it_ends_at_the_target_where_minimize_does_and_shows_what_pymoo_does(posed) -> None:
     for identifier in (identifier_of(name, IDENTIFIERS) for name in ALONE):
         _, first = whole = posed()
         by_pymoo(*whole, identifier, 1)
@@ -79,9 +79,6 @@ def test_it_ends_at_the_target_where_minimize_does(posed) -> None:
         by_pymoo(other, theirs, identifier, 1)
         assert 0 < meter.used == theirs.used <= first.used
         assert meter.best_f == theirs.best_f <= target
-
-
-def test_what_pymoo_is_given_to_see_to_it_sees_to(posed) -> None:
     (problem, meter), (other, theirs) = posed(), posed()
     shown = PaperPSO(n_particles=20, output=SingleObjectiveOutput(), verbose=True)
     run(shown, problem, 1, lambda: meter.used >= 60)

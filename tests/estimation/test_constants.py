@@ -31,7 +31,7 @@ class Linear:
         return np.zeros(len(self.jacobian)), self.jacobian
 
 
-def test_the_interval_counts_what_is_not_known_as_a_joint_estimate_does():
+def test_the_interval_counts_what_is_not_known_jointly_and_common_factors_are_told():
     rng = np.random.default_rng(1)
     jacobian, doubts = rng.normal(size=(50, 2)), rng.normal(size=(50, 3))
     found = information_of(Linear(jacobian), np.array([0.5, 0.5]), None, doubts)
@@ -40,9 +40,6 @@ def test_the_interval_counts_what_is_not_known_as_a_joint_estimate_does():
     assert found.deviation == pytest.approx(np.sqrt(np.diag(joint)[:2]) * Linear.span)
     without = information_of(Linear(jacobian), np.array([0.5, 0.5]), None, columns_of((), 50))
     assert (without.deviation < found.deviation).all()
-
-
-def test_what_is_known_up_to_a_common_factor_is_told():
     rng = np.random.default_rng(2)
     a, b, c, d = rng.normal(size=(4, 40))
     slopes = np.column_stack([a, b, c])
@@ -60,7 +57,7 @@ def test_what_is_known_up_to_a_common_factor_is_told():
     assert common_factors(("p",), slopes[:, :1], [Product(("other",), (1.0,), 0.02, d)]) == ()
 
 
-def test_tolerances_of_a_campaign_of_a_plant_and_of_neither():
+def test_tolerances_of_a_campaign_of_a_plant_of_neither_and_of_what_records_alone_set(write_axis, tmp_path):
     usual = tolerances_of({}, ARM, "campaign.toml")
     assert usual["R"] == 0.02
     assert not {"g", "theta_C", "shell", "U"} & set(usual)
@@ -71,10 +68,7 @@ def test_tolerances_of_a_campaign_of_a_plant_and_of_neither():
     assert set(tolerances_of({"default": 0.1}, PLANTS["driven_axis"], "")) == {"gain", "gravity_moment"}
     with pytest.raises(ArmidError, match="tolerances: constant 'RR' is unknown, did you mean 'R'"):
         tolerances_of({"RR": 0.1}, ARM, "campaign.toml")
-
-
-def test_a_tolerance_counts_for_a_constant_that_the_records_alone_set(write_axis, tmp_path):
-    """The declared gravity moment is 0, of which no share is known; that of the record is not."""
+    # The declared gravity moment is 0, of which no share is known; that of the record is not.
     known = []
     for more in ("", "constants = { gravity_moment = 1.2 }\n"):
         folder = write_axis(tmp_path / str(len(known)), more=f"{more}[tolerances]\ngravity_moment = 0.05\n")

@@ -21,14 +21,6 @@ both, speed = partial(write_arm, outputs="both"), partial(write_arm, outputs="sp
 bare = partial(write_axis, position=False)
 
 
-def noise(values):
-    return np.random.default_rng(3).normal(0.0, 20.0, values.size)
-
-
-def later(values, n=12):
-    return np.concatenate([np.full(n, values[0]), values[:-n]])
-
-
 def everywhere(column, function):
     return change(column, function, *FILES)
 
@@ -39,16 +31,13 @@ def together(change_of):
     return rewritten(lambda c: c | dict(zip((HUB, TWIST), change_of(c[HUB], c[TWIST]), strict=True)), *FILES)
 
 
-def clock(factor, file):
-    return change("time_s", lambda t: factor * t, file)
-
-
 # name: campaign, what is done to it, words of which the first sentence about the train records must hold one.
 MISTAKES = {
     "angle inverted": (write_arm, (everywhere(ANGLE, np.negative),), r"every.*rad signal: its sign"),
     "angle in rad": (write_arm, (everywhere(ANGLE, np.deg2rad),), "every.*radians under a header in deg"),
     "drive inverted": (write_arm, (everywhere(DRIVE, np.negative),), "every.*input 'u': its sign"),
-    "noise": (write_arm, (change(ANGLE, noise, "b.csv"),), r"b\.csv: the measured angle is noise"),
+    "noise": (write_arm, (change(ANGLE, lambda x: np.random.default_rng(3).normal(0.0, 20.0, x.size), "b.csv"),),
+              r"b\.csv: the measured angle is noise"),
     "horizontal": (write_arm, (everywhere(ANGLE, lambda x: x + 90.0),), "every.*from elsewhere: with -90"),
     "of two, speed inverted": (both, (everywhere(SPEED, np.negative),), r"every.*velocity \[rad/s\]: its sign"),
     "of two, angle inverted": (both, (everywhere(ANGLE, np.negative),), r"every.*angle \[rad\]: its sign"),
@@ -60,8 +49,9 @@ MISTAKES = {
     "thousandths": (write_link, (everywhere(TWIST, lambda x: 1000.0 * x),), "every.*1,000 times too (large|small)"),
     "exchanged": (write_link, (together(lambda hub, twist: (twist, hub)),), "hub_angle and deflection look exchanged"),
     "absolute": (write_link, (together(lambda hub, twist: (hub, hub + twist)),), "deflection looks counted from"),
-    "drive late": (write_link, (change(DRIVE, later, "a.csv"),), r"a\.csv: its clock looks 0\.(09|1)\d* s early"),
-    "of two, ms once": (both, (clock(1000, "b.csv"),), r"b\.csv: time_s looks like milli"),
+    "drive late": (write_link, (change(DRIVE, lambda u: np.concatenate([np.full(12, u[0]), u[:-12]]), "a.csv"),),
+                   r"a\.csv: its clock looks 0\.(09|1)\d* s early"),
+    "of two, ms once": (both, (change("time_s", lambda t: 1000 * t, "b.csv"),), r"b\.csv: time_s looks like milli"),
     "deflection in rad": (
         write_link, (everywhere(TWIST, np.deg2rad),), r"every.*deflection \[rad\]: 57\.3 times too small"),
 }  # fmt: skip

@@ -54,18 +54,10 @@ def test_the_grid_of_the_arm_is_what_campaign_toml_could_say(paper_arm, arm):
         assert (f.window, f.manoeuvre.n_samples) == (slice(100, 701), 701)
 
 
-def test_places_are_told_from_other_keys(arm):
-    plant = arm.plant
-    assert [k.key for k in plant.keys if is_place(plant, k)] == ["start_angle_deg", "target_angle_deg"]
-    assert key_travel(plant) == {"theta": (-55.0 * DEGREE, 45.0 * DEGREE)}
-    load = ManoeuvreKey("load_kg", "m_loaded", 1.0, 0.0, 500.0, required=True)
-    assert not is_place(replace(plant, keys=(*plant.keys, load)), load)
-
-
-def test_words():
-    arm = {"start_angle_deg": 20.0, "target_angle_deg": -40.0, "shell": False, "supply_V": 24.0}
-    assert words(arm, "") == "raise, empty, 24 V from 20 to -40 deg"
-    assert words(arm | {"target_angle_deg": 44.0, "shell": True}, "a.csv") == (
+def test_words_of_a_manoeuvre_and_places_among_its_keys(arm):
+    stroke = {"start_angle_deg": 20.0, "target_angle_deg": -40.0, "shell": False, "supply_V": 24.0}
+    assert words(stroke, "") == "raise, empty, 24 V from 20 to -40 deg"
+    assert words(stroke | {"target_angle_deg": 44.0, "shell": True}, "a.csv") == (
         "a.csv once more (lower, with shell, 24 V from 20 to 44 deg)"
     )
     assert words({"speed_rad_s": 2.0, "clutch": True, "brake": False, "gear": 3.0}, "") == (
@@ -75,16 +67,15 @@ def test_words():
         "the inputs of a.csv reversed, 0.5 of their size, 2 times as fast"
     )
     assert words({"like": "a.csv"}, "a.csv") == "a.csv once more"
+    plant = arm.plant
+    assert [k.key for k in plant.keys if is_place(plant, k)] == ["start_angle_deg", "target_angle_deg"]
+    assert key_travel(plant) == {"theta": (-55.0 * DEGREE, 45.0 * DEGREE)}
+    load = ManoeuvreKey("load_kg", "m_loaded", 1.0, 0.0, 500.0, required=True)
+    assert not is_place(replace(plant, keys=(*plant.keys, load)), load)
 
 
-@pytest.fixture(scope="module")
-def motions(paper_arm, arm, arm_space):
-    ready = replays(paper_arm.train[2:], arm, arm_space)
-    return lambda limit: Motions(ready, TRUTH, limit)
-
-
-def test_a_stroke_that_leaves_the_travel_or_does_not_move_is_passed_over(motions, paper_arm, arm):
-    template = as_recorded(arm.plant, paper_arm.train[0])
+def test_a_stroke_that_leaves_the_travel_or_does_not_move_is_passed_over(paper_arm, arm, arm_space):
+    template, ready = as_recorded(arm.plant, paper_arm.train[0]), replays(paper_arm.train[2:], arm, arm_space)
 
     def told(**constants):
         changed = {**template.manoeuvre.constants, **constants}
@@ -93,19 +84,19 @@ def test_a_stroke_that_leaves_the_travel_or_does_not_move_is_passed_over(motions
     fine = told()
     hung = told(U=1.0, m_loaded=72.5, L_loaded=0.41)
     over = told(theta_D=44.9 * DEGREE, K_d=1.0, theta_C=-54.0 * DEGREE)
-    found = dict(motions(None).signals([fine, over, hung], TRUTH[np.newaxis]))
+    found = dict(Motions(ready, TRUTH, None).signals([fine, over, hung], TRUTH[np.newaxis]))
     assert set(found) >= {fine}
     assert over not in found
     # nor does the sensor show what is too fast for it
     grid = manoeuvre_grid(arm, paper_arm.train)
-    able, slow = (dict(motions(limit * DEGREE).signals(grid, TRUTH[np.newaxis])) for limit in (200.0, 100.0))
+    able, slow = (dict(Motions(ready, TRUTH, limit * DEGREE).signals(grid, TRUTH[np.newaxis]))
+                  for limit in (200.0, 100.0))  # fmt: skip
     assert 0 < len(slow) < len(able) <= len(grid)
     assert max(np.abs(s).max() for s in slow.values()) <= 100.0 * DEGREE < max(np.abs(s).max() for s in able.values())
 
 
-@pytest.fixture
-def driven(write_axis, tmp_path):
-    """An axis under a drive that changes its sign, with a supply that does not."""
+def test_recorded_inputs_are_changed(write_axis, axis_model, tmp_path):
+    """Of an axis under a drive that changes its sign, with a supply that does not."""
     campaign = read_campaign(write_axis(tmp_path / "axis"))
     (record,) = campaign.train
     times = record.times
@@ -118,14 +109,9 @@ def driven(write_axis, tmp_path):
         pieces = tuple(replace(p, manoeuvre=with_inputs(p.manoeuvre, **more)) for p in record.pieces)
         return replace(record, pieces=pieces)
 
-    return campaign, told
-
-
-def test_recorded_inputs_are_changed(driven, axis_model):
-    campaign, told = driven
-    record = told()
-    grid = {f.name.removeprefix("the inputs of move.csv "): f for f in manoeuvre_grid(Model(campaign.plant), [record])}
-    u = record.pieces[0].manoeuvre.inputs["u"]
+    made = told()
+    grid = {f.name.removeprefix("the inputs of move.csv "): f for f in manoeuvre_grid(Model(campaign.plant), [made])}
+    u = inputs["u"]
     assert len(grid) == 12
     half = grid["reversed, 0.5 of their size"].manoeuvre.inputs
     np.testing.assert_allclose(half["u"], -0.5 * u)
@@ -141,8 +127,8 @@ def test_recorded_inputs_are_changed(driven, axis_model):
     # the axis moves no further and no faster than it did
     space = space_of(axis_model, bounds={"mass": (1.0, 4.0), "viscous.slope": (1.0, 10.0)})
     candidate = space.complete(np.array([[2.0, 5.0]]))
-    motions = Motions(replays([record], axis_model, space), candidate[0])
-    able = {f.name for f, _ in motions.signals(manoeuvre_grid(axis_model, [record]), candidate)}
+    motions = Motions(replays([made], axis_model, space), candidate[0])
+    able = {f.name for f, _ in motions.signals(manoeuvre_grid(axis_model, [made]), candidate)}
     assert able >= {"move.csv once more", "the inputs of move.csv 0.5 of their size"}
     assert "the inputs of move.csv 0.5 times as fast" not in able
 
@@ -150,8 +136,7 @@ def test_recorded_inputs_are_changed(driven, axis_model):
 NOISE = 0.25 * np.pi / 180.0
 
 
-@pytest.fixture(scope="module")
-def bought(paper_arm, arm, arm_space):
+def test_they_are_the_intervals_of_a_record_that_was_made(paper_arm, arm, arm_space):
     """Offers after one lowering, by what they are ranked; the raising and the short stroke are among them."""
     records = [with_noise(r, rms=NOISE, effective_fraction=1.0) for r in paper_arm.train]
     told = replays(records, arm, arm_space)
@@ -163,11 +148,6 @@ def bought(paper_arm, arm, arm_space):
     def ranked(by, level=Level(NOISE, 1.0)):
         return offers(motions, grid, arm_space, TRUTH, information.fisher, [level], by)
 
-    return told, information, ranked
-
-
-def test_they_are_the_intervals_of_a_record_that_was_made(bought, arm_space):
-    told, information, ranked = bought
     repeated = {o.feasible.repeats: o for o in ranked("volume") if o.feasible.repeats}
     for file, replay in (("raise.csv", told[3]), ("short.csv", told[4]), ("lower.csv", told[1])):
         made = information_at((told[0], replay), arm_space, TRUTH)
@@ -187,7 +167,7 @@ def test_they_are_the_intervals_of_a_record_that_was_made(bought, arm_space):
         assert offer.gain < white[offer.feasible].gain
 
 
-def test_what_is_ranked_by_is_what_it_says():
+def test_what_is_ranked_by_is_what_it_says_at_the_level_to_expect():
     before, after = np.diag([100.0, 400.0]), np.diag([400.0, 3600.0])
     # with the box as a first record: 112, 412 and 412, 3612
     assert gain(before, after, "volume") == pytest.approx((412 * 3612 / (112 * 412)) ** 0.25)
@@ -199,9 +179,6 @@ def test_what_is_ranked_by_is_what_it_says():
     offer = Offer(None, np.array([0.1, np.inf]), np.array([0.1, 0.5]), 2.0)
     assert offer.best == 1
     assert Offer(None, np.array([0.1, np.inf]), np.array([0.05, np.inf]), 2.0).best == 0
-
-
-def test_the_level_to_expect():
     told = [SimpleNamespace(place=place) for place in (0, 1, 0)]
     level, other = expected_levels(told, [Level(1.0, 1.0), Level(0.1, 1.0), Level(7.0, 0.5)])
     assert other.rms == 0.1

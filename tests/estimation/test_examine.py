@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 from itertools import combinations
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -32,12 +33,6 @@ def one_stroke(lowering, arm, arm_space):
     return examine(lowering, arm, arm_space)
 
 
-@pytest.fixture(scope="module")
-def with_friction(lowering, arm):
-    model = arm + EFFECTS["coulomb"]
-    return examine(lowering, model, space_of(model))
-
-
 def sentence(found, *words):
     """Return the one remark that holds all of some words."""
     told = [r for r in remarks(found) if all(w in r for w in words)]
@@ -45,30 +40,23 @@ def sentence(found, *words):
     return told[0]
 
 
-def test_at_the_estimate_it_is_the_information_there(one_stroke, arm_space):
+def test_at_the_estimate_it_is_the_information_there_and_what_moves_together_is_said(one_stroke, arm_space):
     expected = information_at(one_stroke.replays, arm_space, one_stroke.minimum)
     np.testing.assert_allclose(one_stroke.information.deviation, expected.deviation, rtol=1e-6)
     np.testing.assert_array_equal(one_stroke.x, one_stroke.minimum)
     assert np.abs(expected.step).max() < 0.05
     assert [p.name for p in one_stroke.profiles] == ["p0", "k", "eta3", "n"]
     assert not one_stroke.at_bound.any()
-
-
-def test_what_moves_together_is_said(one_stroke):
     told = sentence(one_stroke, "p0, eta3 and n move together")
     assert "+0.42 % of n goes next to unseen with" in told
     # p0 less and n more balance the arm alike
     assert "-0.14 % of p0" in told
 
 
-def test_holdout_has_no_say(lowering, one_stroke, arm, arm_space):
-    train, holdout = lowering.records
-    garbage = holdout.with_measured({holdout.output: -7.0 * holdout.measured})
-    again = examine(replace(lowering, records=(train, garbage)), arm, arm_space)
-    assert json.dumps(result_of(again)) == json.dumps(result_of(one_stroke))
-
-
-def test_an_effect_that_is_not_there_is_below_a_bound(with_friction):
+def test_an_effect_that_is_not_there_is_below_a_bound_and_its_profile_is_drawn(lowering, arm):
+    model = arm + EFFECTS["coulomb"]
+    with_friction = examine(lowering, model, space_of(model))
+    profile = with_friction.profiles[4]
     told = sentence(with_friction, "coulomb.level may be null")
     assert "it is below" in told
     profile = with_friction.profiles[4]
@@ -78,8 +66,24 @@ def test_an_effect_that_is_not_there_is_below_a_bound(with_friction):
     # the bound holds the friction, so that the parabola, which knows no bound, promises too little
     assert "believe the profile" in sentence(with_friction, "p0: the profile says")
 
+    figure, axis = plt.subplots()
+    draw_profile(axis, profile)
+    drawn = {line.get_label(): line for line in axis.lines}
+    assert set(drawn) == {"by curvature", "profile", "fitted again", "95 % threshold", "bound of the box", "estimate"}
+    assert drawn["95 % threshold"].get_ydata()[0] == PROFILE_RISE
+    parabola = drawn["by curvature"]
+    expected = ((parabola.get_xdata() - profile.estimate) / profile.deviation) ** 2
+    np.testing.assert_allclose(parabola.get_ydata(), expected)
+    left, right = axis.get_xlim()
+    assert left <= profile.low < profile.high <= right
+    plt.close(figure)
+    values, rise = smooth(profile, 1e-6)
+    np.testing.assert_allclose(np.interp(1e-6 * profile.values, values, rise), profile.rise, atol=0.02)
+    assert interval_text(1.39814, 1.40181) == "1.39814 to 1.40181"
+    assert interval_text(100.0, 4000.0) == "100 to 4000"
 
-def test_a_point_that_is_given(lowering, arm, arm_space, one_stroke):
+
+def test_a_point_that_is_given_and_a_holdout_that_has_no_say(lowering, arm, arm_space, one_stroke):
     point = TRUTH * [1.0, 0.98, 1.0, 1.0]
     found = examine(lowering, arm, arm_space, point)
     np.testing.assert_array_equal(found.x, point)
@@ -89,6 +93,10 @@ def test_a_point_that_is_given(lowering, arm, arm_space, one_stroke):
     assert not [r for r in remarks(near) if "point that was given" in r]
     with pytest.raises(ArmidError, match=r"k is 2, a value from 0\.6 to 1\.1 is expected"):
         examine(lowering, arm, arm_space, np.array([3.05e6, 2.0, 0.55, 1.4]))
+    train, holdout = lowering.records
+    garbage = holdout.with_measured({holdout.output: -7.0 * holdout.measured})
+    again = examine(replace(lowering, records=(train, garbage)), arm, arm_space)
+    assert json.dumps(result_of(again)) == json.dumps(result_of(one_stroke))
 
 
 @pytest.mark.parametrize(("told", "said"), [
@@ -132,65 +140,27 @@ def test_what_is_not_seen_is_said(paper_arm, arm, arm_space):
     json.dumps(result_of(found), allow_nan=False)
 
 
-def test_a_profile_is_drawn_with_its_threshold_its_parabola_and_its_bound(with_friction):
-    from matplotlib import pyplot as plt
-
-    figure, axis = plt.subplots()
-    profile = with_friction.profiles[4]
-    draw_profile(axis, profile)
-    drawn = {line.get_label(): line for line in axis.lines}
-    assert set(drawn) == {"by curvature", "profile", "fitted again", "95 % threshold", "bound of the box", "estimate"}
-    assert drawn["95 % threshold"].get_ydata()[0] == PROFILE_RISE
-    parabola = drawn["by curvature"]
-    expected = ((parabola.get_xdata() - profile.estimate) / profile.deviation) ** 2
-    np.testing.assert_allclose(parabola.get_ydata(), expected)
-    left, right = axis.get_xlim()
-    assert left <= profile.low < profile.high <= right
-    plt.close(figure)
-    values, rise = smooth(profile, 1e-6)
-    np.testing.assert_allclose(np.interp(1e-6 * profile.values, values, rise), profile.rise, atol=0.02)
-    assert interval_text(1.39814, 1.40181) == "1.39814 to 1.40181"
-    assert interval_text(100.0, 4000.0) == "100 to 4000"
-
-
 def fisher_of(*columns):
     design = np.column_stack(columns)
     return design.T @ design
 
 
-@pytest.fixture
-def basis():
-    return np.linalg.qr(np.random.default_rng(1).normal(size=(40, 6)))[0].T
-
-
-def test_the_index_of_two_is_that_of_their_angle(basis):
-    a, b, *_ = basis
+def test_groups_and_their_index_of_two_of_three_of_two_groups_and_of_nothing():
+    a, b, c, d, e, f = np.linalg.qr(np.random.default_rng(1).normal(size=(40, 6)))[0].T
     assert collinearity_index(fisher_of(a, b)) == pytest.approx(1.0)
     for cosine in (0.5, 0.99, -0.999):
         tilted = 7.0 * (cosine * a + np.sqrt(1 - cosine**2) * b)
         assert collinearity_index(fisher_of(a, tilted)) == pytest.approx(1 / np.sqrt(1 - abs(cosine)), rel=1e-6)
-
-
-def test_three_that_only_together_are_collinear(basis):
-    a, b, c, d, *_ = basis
     fisher = fisher_of(a, 3.0 * d, b, 5.0 * (a + b) + 0.05 * c)
     (group,) = groups(fisher, ("p", "q", "r", "s"))
     assert group.names == ("p", "r", "s")
     # s = 5 p + 5 r, so that moving s by -1/5 undoes a move of p and r
     np.testing.assert_allclose(group.direction / group.direction[0], [1.0, 1.0, -0.2], rtol=1e-3)
     assert all(collinearity_index(fisher[np.ix_(p, p)]) < 10.0 for p in combinations(range(4), 2))
-
-
-def test_two_groups_and_what_is_alone(basis):
-    a, b, c, d, e, f = basis
     fisher = fisher_of(a, b, a + 0.02 * c, d, b + 0.05 * e, f)
     found = groups(fisher, tuple("uvwxyz"))
     assert [g.names for g in found] == [("u", "w"), ("v", "y")]
     assert found[0].index > found[1].index > 10.0
-
-
-def test_nothing_to_tell(basis):
-    a, b, *_ = basis
     assert groups(fisher_of(a, b), ("p", "q")) == ()
     assert groups(fisher_of(a), ("p",)) == ()
     assert groups(np.zeros((2, 2)), ("p", "q")) == ()

@@ -64,36 +64,25 @@ def test_the_holdout_never_enters(found, lowering):
     assert results[2].holdout is None
 
 
-def test_the_budget_is_used_exactly_and_the_trace_falls(lowering_found):
+def test_the_budget_is_used_exactly_unless_an_identifier_stops_by_itself(lowering_found, lowering, arm, arm_space):
     assert (lowering_found.used, lowering_found.budget, lowering_found.stopped) == (160, 160, "budget used")
     evaluations, values = lowering_found.trace
     assert (np.diff(evaluations) > 0).all()
     assert (np.diff(values) < 0).all()
     assert values[-1] == lowering_found.value == pytest.approx(1.0 - lowering_found.train.s, abs=1e-12)
-
-
-def test_an_identifier_may_stop_by_itself(lowering, arm, arm_space):
     short = replace(IDENTIFIERS["pso"], name="short", build=lambda _: CMAES(restarts=0, maxiter=5))
     result = identify(lowering, arm, arm_space, FITNESS["nrmse"], short, budget=5000)
     assert result.stopped == "short stopped by itself"
     assert 0 < result.used < 5000
 
 
-@pytest.fixture(scope="module")
-def several(paper_arm, arm, arm_space):
-    """Records whose windows last 0.4, 0.7 and 1.2 s."""
+def test_records_joined_without_noise_and_of_a_diverged_candidate(paper_arm, arm, arm_space):
+    """Windows last 0.4, 0.7 and 1.2 s."""
     windows = ((0.1, 0.5), (0.0, 0.7), (0.0, 1.2))
     records = [paper_arm.with_window(*w).train[i] for w, i in zip(windows, (0, 3, 4))]
-    return replays(records, arm, arm_space)
-
-
-def series(replay):
-    """Return measured and simulated samples of the window, rad/s."""
-    return replay.measured, replay.signal(CANDIDATE[np.newaxis])[0]
-
-
-def test_records_joined(several):
-    pairs = [series(r) for r in several]
+    several = replays(records, arm, arm_space)
+    # measured and simulated samples of the window, rad/s
+    pairs = [(r.measured, r.signal(CANDIDATE[np.newaxis])[0]) for r in several]
     each = [record_errors(r, CANDIDATE) for r in several]
     for (x, y), e in zip(pairs, each, strict=True):
         assert e.nrmse == pytest.approx(e.rmse / np.sqrt(np.mean(x**2)), rel=1e-12)
@@ -110,9 +99,6 @@ def test_records_joined(several):
     levels = [r.record.noise.rms for r in several]
     degrees = np.array([similarity(x, y[None], 1e-3, noise=rms) for (x, y), rms in zip(pairs, levels)])[:, :, 0]
     np.testing.assert_allclose([joined.s, joined.s1, joined.s2], seconds @ degrees / seconds.sum(), rtol=1e-12)
-
-
-def test_without_noise_there_is_no_chi_square_and_a_diverged_candidate_has_infinite_errors(several):
     quiet = noisy(several[0], rms=0.0)
     assert record_errors(quiet, CANDIDATE).chi2_per_sample is None
     assert campaign_errors((quiet, several[1]), CANDIDATE).chi2_per_sample is None

@@ -5,12 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from linear_records import linear_records
-from scipy.optimize import least_squares
+from scipy.optimize import least_squares, lsq_linear
+from scipy.stats import chi2
 
 from armid.engine import Schedule
 from armid.estimation.identify_document import remarks
-from armid.estimation.information import collinear, information_at, information_of, sensitivities
-from armid.estimation.least_squares import estimate
+from armid.estimation.information import (
+    PROFILE_RISE,
+    collinear,
+    information_at,
+    information_of,
+    profiles,
+    sensitivities,
+)
+from armid.estimation.least_squares import estimate, fit
 from armid.problem.problem import replays
 from armid.problem.space import space_of
 from armid.record import read_campaign
@@ -31,11 +39,22 @@ def several(paper_arm, arm, arm_space):
     return tuple(with_noise(r, NOISE) for r in replays(paper_arm.with_window(0.0, 0.7).train[2:], arm, arm_space))
 
 
-def test_the_reference_arm_on_one_stroke(lowering_replays, arm_space):
+def test_the_reference_arm_on_one_stroke_with_more_with_coloured_and_without_noise(lowering_replays, arm_space):
     information = information_at((with_noise(lowering_replays[0], 0.3 * DEGREE),), arm_space, TRUTH)
     # one sigma of 0.26, 0.06, 0.39, 0.84 % was found with another program for white noise of 0.3 deg/s on 0 to 0.7 s
     np.testing.assert_allclose(100 * information.deviation / TRUTH, [0.26, 0.06, 0.39, 0.84], atol=0.006)
     np.testing.assert_allclose(information.half_width, 1.959963985 * information.deviation)
+    plain, loud, coloured = (
+        information_at((with_noise(lowering_replays[0], rms, share),), arm_space, TRUTH)
+        for rms, share in ((NOISE, 1.0), (3 * NOISE, 1.0), (NOISE, 0.25))
+    )
+    np.testing.assert_allclose(loud.deviation, 3 * plain.deviation)
+    np.testing.assert_allclose(coloured.deviation, 2 * plain.deviation)
+    clean = lowering_replays[0].measuring(lowering_replays[0].signal(TRUTH[np.newaxis])[0])
+    information = information_at((with_noise(clean, 0.0),), arm_space, TRUTH)
+    np.testing.assert_array_equal(information.half_width, 0.0)
+    assert not information.levels[0].from_residual
+    assert collinear(information)
 
 
 def test_correlations_of_one_stroke(lowering_replays, several, arm_space):
@@ -47,23 +66,6 @@ def test_correlations_of_one_stroke(lowering_replays, several, arm_space):
     assert [abs(r) for *_, r in pairs] == sorted((abs(r) for *_, r in pairs), reverse=True)
     many = information_at(several, arm_space, TRUTH)
     assert (many.deviation < one.deviation).all()
-
-
-def test_more_noise_and_coloured_noise_widen(lowering_replays, arm_space):
-    plain, loud, coloured = (
-        information_at((with_noise(lowering_replays[0], rms, share),), arm_space, TRUTH)
-        for rms, share in ((NOISE, 1.0), (3 * NOISE, 1.0), (NOISE, 0.25))
-    )
-    np.testing.assert_allclose(loud.deviation, 3 * plain.deviation)
-    np.testing.assert_allclose(coloured.deviation, 2 * plain.deviation)
-
-
-def test_without_noise_and_residual_the_interval_is_nothing(lowering_replays, arm_space):
-    clean = lowering_replays[0].measuring(lowering_replays[0].signal(TRUTH[np.newaxis])[0])
-    information = information_at((with_noise(clean, 0.0),), arm_space, TRUTH)
-    np.testing.assert_array_equal(information.half_width, 0.0)
-    assert not information.levels[0].from_residual
-    assert collinear(information)
 
 
 def test_what_the_model_lacks_widens(lowering_replays, arm_space):
@@ -201,13 +203,7 @@ def test_agree_with_the_closed_form_of_an_axis(axis):
         np.testing.assert_allclose(found, expected, atol=within * np.max(np.abs(expected)))
 
 
-def test_two_names_for_one_thing_are_both_not_determined():
-    a, b = np.random.default_rng(1).normal(size=(2, 30))
-    records = linear_records(np.column_stack([a, b, b]), 0.4 * a)
-    np.testing.assert_array_equal(np.isinf(information_of(records, np.full(3, 0.4)).deviation), [False, True, True])
-
-
-def test_an_estimate_with_other_weights_than_those_of_the_noise_scatters_more():
+def test_linear_records_with_other_weights_than_those_of_the_noise_and_with_two_names_for_one_thing():
     """Two records that tell as much of one parameter, the second four times as loud, in a sum of squares of both alike.
 
     The mean of both has the variance (s1^2 + s2^2)/4n, not that of the weighted mean.
@@ -222,3 +218,90 @@ def test_an_estimate_with_other_weights_than_those_of_the_noise_scatters_more():
     assert best == pytest.approx([(n + n / loud**2) ** -0.5])
     assert alike == pytest.approx([np.sqrt(1.0 + loud**2) / np.sqrt(4.0 * n)])
     assert information_of(records, np.array([0.5]), weighed=weighed).step == pytest.approx(-0.1 * span / (alike * span))
+    a, b = np.random.default_rng(1).normal(size=(2, 30))
+    records = linear_records(np.column_stack([a, b, b]), 0.4 * a)
+    np.testing.assert_array_equal(np.isinf(information_of(records, np.full(3, 0.4)).deviation), [False, True, True])
+
+
+def seen_by(design, z, rng):
+    return design @ z + rng.normal(size=len(design))
+
+
+def test_of_a_linear_model_it_is_the_parabola():
+    assert pytest.approx(chi2.ppf(0.95, 1)) == PROFILE_RISE
+    rng = np.random.default_rng(3)
+    design = 60.0 * rng.normal(size=(50, 3))
+    design[:, 1] += 2.0 * design[:, 0]
+    records = linear_records(design, seen_by(design, np.array([0.4, 0.5, 0.6]), rng))
+    best, found = profiles(records, np.full(3, 0.5))
+    deviation = 10.0 * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
+    np.testing.assert_allclose(best, np.linalg.lstsq(design, records.measured)[0], atol=1e-7)
+    for p, d in zip(found, deviation, strict=True):
+        assert p.bounded == (True, True)
+        assert p.agrees
+        np.testing.assert_allclose(p.deviation, d, rtol=1e-6)
+        np.testing.assert_allclose([p.low, p.high], p.estimate + np.array([-1, 1]) * 1.95996 * d, atol=2e-3 * d)
+        np.testing.assert_allclose(p.rise, ((p.values - p.estimate) / d) ** 2, atol=1e-5)
+        assert (np.diff(p.values) >= 0.0).all()
+        assert p.rise[[0, -1]].min() > PROFILE_RISE
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_with_bounds_it_is_the_bounded_solution(seed):
+    """Hold a parameter, solve for the others in the box with another program: the same rise at every point."""
+    rng = np.random.default_rng(seed)
+    design = 10.0 * rng.normal(size=(30, 3))
+    design[:, 0] = design[:, 1] - design[:, 2] + 0.5 * rng.normal(size=30)
+    records = linear_records(design, seen_by(design, np.array([0.02, 0.5, 0.97]), rng))
+    _, found = profiles(records, np.full(3, 0.5))
+    least = 2.0 * lsq_linear(design, records.measured, bounds=(0.0, 1.0), tol=1e-14).cost
+    for i, p in enumerate(found):
+        others = [j for j in range(3) if j != i]
+        for value, rise in zip(p.values, p.rise, strict=True):
+            rest = records.measured - design[:, i] * (value - 10.0) / 10.0
+            told = 2.0 * lsq_linear(design[:, others], rest, bounds=(0.0, 1.0), tol=1e-14).cost
+            assert rise == pytest.approx(told - least, abs=1e-3)
+        assert p.low == 10.0 or p.bounded[0]
+        assert p.high == 20.0 or p.bounded[1]
+        assert p.low <= p.estimate <= p.high
+    assert any(not p.agrees for p in found)
+
+
+def test_what_is_not_seen_a_bound_and_a_region_that_diverges_leave_their_sides_open_or_bounded():
+    design = np.column_stack([40.0 * np.linspace(0.5, 1.0, 20), np.zeros(20)])
+    _, (seen, unseen) = profiles(linear_records(design, design @ [0.5, 0.5]), np.array([0.4, 0.4]))
+    assert seen.bounded == (True, True)
+    assert unseen.bounded == (False, False)
+    assert (unseen.low, unseen.high) == (10.0, 20.0)
+    assert np.isinf(unseen.deviation)
+    assert unseen.agrees
+    np.testing.assert_allclose(unseen.rise, 0.0, atol=1e-9)
+    design = 30.0 * np.eye(2)
+    _, (held, _) = profiles(linear_records(design, design @ [-0.05, 0.5]), np.array([0.5, 0.5]))
+    assert held.bounded == (False, True)
+    assert held.estimate == held.low == 10.0
+    # (30 z + 1.5)^2 - 1.5^2 = 3.84
+    assert held.high == pytest.approx(10.0 + 10.0 * (np.sqrt(PROFILE_RISE + 2.25) - 1.5) / 30.0, abs=2e-3)
+    assert len(held.values) > 5
+    design = 5.0 * np.eye(2)
+    _, (p, _) = profiles(linear_records(design, design @ [0.5, 0.5], lost=0.6), np.array([0.4, 0.4]))
+    assert p.bounded[1]
+    assert p.high == pytest.approx(16.0, abs=0.05)
+    assert np.isfinite(p.rise).all()
+
+
+class TwoValleys(type(linear_records(np.eye(1), np.zeros(1)))):
+    """Signals whose sum of squares has a second, deeper valley."""
+
+    def signals(self, Z):
+        z = np.atleast_2d(Z)[:, :1]
+        return np.concatenate([20.0 * (z - 0.2) * (z - 0.8), 2.0 * (z - 0.8)], axis=1)
+
+
+def test_a_profile_that_finds_a_deeper_valley_starts_again_there():
+    plain = linear_records(np.ones((2, 1)), np.zeros(2))
+    records = TwoValleys((), plain.space, plain.design, np.zeros(2))
+    assert fit(records, np.array([0.1]))[0] < 0.3
+    best, (p,) = profiles(records, np.array([0.1]))
+    assert best[0] == pytest.approx(0.8, abs=1e-6)
+    assert p.rise.min() >= 0.0

@@ -47,18 +47,14 @@ def fitted(tmp_path_factory):
     return space, ready, estimate(ready, space)
 
 
-def test_the_estimate_comes_from_anywhere_in_the_range_without_continuation(fitted):
+def test_the_estimate_comes_from_anywhere_in_the_range_and_intervals_hold_the_truth(fitted):
     """The steps of the voltage are 30 samples long: chi2 has its next minimum beyond them."""
     space, ready, x = fitted
     sd = information_at(ready, space, x).deviation
     assert np.all(np.abs(x - [DRUM, FRICTION, DELAY]) <= 4.0 * sd)
     for delay in (0.0, 0.003, 0.008, 0.021, 0.03):
         assert np.all(np.abs(refine(ready, space, np.array([x[0], x[1], delay])) - x) <= 0.02 * sd)
-
-
-def test_intervals_hold_the_truth(fitted):
-    """Of 16 noises a 95 % interval misses 4 or more with a chance of 1 %; the mean is off by less than the noise."""
-    space, ready, _ = fitted
+    # Of 16 noises a 95 % interval misses 4 or more with a chance of 1 %; the mean is off by less than the noise.
     truth = space.complete(np.array([[DRUM, FRICTION, DELAY]]))
     signals, rng, found = [r.signal(truth)[0] for r in ready], np.random.default_rng(8), []
     for _ in range(16):

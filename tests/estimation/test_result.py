@@ -21,18 +21,7 @@ from armid.report.terminal import show
 from changed_records import noisy
 
 
-@pytest.fixture
-def shown(capsys):
-    """Return a function that gives what a terminal shows of an identification."""
-
-    def text(found):
-        show(identify_document(result_of(found), details_of(found), {}, ""))
-        return capsys.readouterr().out
-
-    return text
-
-
-def test_everything_is_si(lowering_found):
+def test_numbers_are_si_and_remarks_name_bounds_pairs_divergence_and_noise(lowering_found):
     result = result_of(lowering_found)
     assert result["unit"] == "rad/s"
     assert [p["unit"] for p in result["parameters"].values()] == ["Pa", "1", "1", "1"]
@@ -55,9 +44,22 @@ def test_everything_is_si(lowering_found):
         numbers = {k: v for k, v in vars(holdout).items() if k != "unit"}
         # joined over one record: its weight is multiplied in and divided out again
         assert {k: told_of_it[k] for k in numbers} == pytest.approx(numbers, rel=1e-12)
+    at_its_bound = replace(lowering_found, candidate=lowering_found.space.low, n_failed=7)
+    said = "\n".join(remarks(at_its_bound))
+    for name in ("p0", "k", "eta3", "n"):
+        assert f"{name} sits on its bound" in said
+    assert "7 of 160 candidates diverged and were given a penalty." in said
+    assert re.search(
+        r"Hardly to be told apart on these records \(correlation\): \w+ and \w+ [+-]0.9.*n and p0 -0.9", said
+    )
+    assert "lower.csv: noise 0.215 deg/s rms and mean -0.019 deg/s (shown, not subtracted) from 100 samples" in said
 
 
-def test_what_is_not_known_is_null(lowering_found, shown):
+def test_what_is_not_known_is_null(lowering_found, capsys):
+    def shown(found):
+        show(identify_document(result_of(found), details_of(found), {}, ""))
+        return capsys.readouterr().out
+
     lost = lowering_found.information.deviation.copy()
     lost[1] = np.inf
     unknown = np.where([[False], [True], [False], [False]], np.nan, lowering_found.information.correlation)
@@ -76,18 +78,6 @@ def test_what_is_not_known_is_null(lowering_found, shown):
     outputs = {name: replace(e, rmse=np.nan) for name, e in worse.train.outputs.items()}
     lost = replace(worse, train=replace(worse.train, rmse=np.nan, outputs=outputs))
     assert "Error (RMSE): not finite deg/s on the records fitted" in shown(lost)
-
-
-def test_remarks_name_bounds_pairs_divergence_and_noise(lowering_found):
-    at_its_bound = replace(lowering_found, candidate=lowering_found.space.low, n_failed=7)
-    said = "\n".join(remarks(at_its_bound))
-    for name in ("p0", "k", "eta3", "n"):
-        assert f"{name} sits on its bound" in said
-    assert "7 of 160 candidates diverged and were given a penalty." in said
-    assert re.search(
-        r"Hardly to be told apart on these records \(correlation\): \w+ and \w+ [+-]0.9.*n and p0 -0.9", said
-    )
-    assert "lower.csv: noise 0.215 deg/s rms and mean -0.019 deg/s (shown, not subtracted) from 100 samples" in said
 
 
 def test_noise_a_lacking_model_an_unfinished_search_and_a_failed_holdout_are_told(lowering_found):
@@ -155,7 +145,7 @@ def test_of_many_records_eight_are_drawn_of_both_roles_where_there_are_both(foun
     assert size == pytest.approx((13.6, 18.7), abs=0.01)
 
 
-def test_ellipses_of_the_most_correlated_pairs_with_the_truth(lowering_found):
+def test_ellipses_of_the_most_correlated_pairs_with_the_truth_or_of_the_draws_of_a_bootstrap(lowering_found):
     campaign = replace(lowering_found.campaign, truth={"p0": 3.05e6, "k": 1.0, "eta3": 0.55, "n": 1.4})
     figure = figures_of(replace(lowering_found, campaign=campaign))["pairs"]()
     information = lowering_found.information
@@ -170,9 +160,6 @@ def test_ellipses_of_the_most_correlated_pairs_with_the_truth(lowering_found):
     assert np.ptp(y) == pytest.approx(2.0 * 2.4477 * information.deviation[3], rel=1e-3)
     assert np.ravel(axis.lines[-1].get_xydata()) == pytest.approx([3.05, 1.4])
     plt.close(figure)
-
-
-def test_the_draws_of_a_bootstrap_decide_about_their_ellipse(lowering_found):
     space, x = lowering_found.space, np.zeros(4)
     draws = np.random.default_rng(1).normal(0.0, [2.0, 1.0, 0.0, 0.0], (500, 4)) @ np.array(
         [[1.0, 0.5, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0] * 4, [0.0] * 4]

@@ -1,7 +1,6 @@
 """Chains, multistart and CMA-ES with restarts: who gets how many simulations, and where each phase starts."""
 
 import random
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,8 +12,15 @@ from pymoo.core.algorithm import Algorithm
 from pymoo.optimize import minimize
 from searches import Bowl, asked_of, identifier, ran
 
+from armid.estimation.identify import identify
 from armid.identifiers import IDENTIFIERS, as_identifier, identifier_of
 from armid.identifiers.catalogue import spread
+from armid.model import Model
+from armid.problem.fitness import FITNESS
+from armid.problem.meter import Meter, MeterTermination
+from armid.problem.problem import IdentificationProblem, replays
+from armid.problem.space import space_of
+from armid.record import Campaign, read_campaign
 
 OWN = IDENTIFIERS | {
     "mine": as_identifier("mine", NelderMead), "evolution": as_identifier("evolution", lambda budget: DE(pop_size=10)),
@@ -38,7 +44,7 @@ def test_the_first_phase_gets_its_share_exactly_and_the_second_starts_at_its_bes
     assert f.min() < f[:end].min()
 
 
-def test_three_phases_and_the_budget_that_an_early_end_leaves() -> None:
+def test_three_phases_the_budget_that_an_early_end_leaves_and_a_swarm_with_the_inertia_of_its_share() -> None:
     problem = Bowl()
     ran("random+bobyqa+nelder_mead", problem, 400, share="0.1:0.2", **{"random.n_candidates": 40})
     sizes = [len(batch) for batch in problem.batches]
@@ -49,9 +55,6 @@ def test_three_phases_and_the_budget_that_an_early_end_leaves() -> None:
     again = [i for i in range(60, 121) if (asked[:i] == asked[i]).all(axis=1).any()]
     assert again
     np.testing.assert_allclose(asked[again[0]], asked[np.argmin(f[: again[0]])], rtol=1e-12)
-
-
-def test_a_swarm_in_a_chain_has_the_inertia_schedule_of_its_share() -> None:
     problem, alone = Bowl(), Bowl()
     ran("pso+bobyqa", problem, 100, share=0.64, **{"pso.n_particles": 8, "pso.velocity_limit": 0.2})
     seed = int(np.random.default_rng(1).integers(1, 2**31 - 1))
@@ -59,13 +62,18 @@ def test_a_swarm_in_a_chain_has_the_inertia_schedule_of_its_share() -> None:
     np.testing.assert_array_equal(asked_of(problem)[0][:64], asked_of(alone)[0])
 
 
-def test_capabilities_of_the_composed_are_those_of_their_parts() -> None:
+def test_capabilities_of_the_composed_are_those_of_their_parts_and_options_reach_these() -> None:
     chain = identifier("random+multistart:least_squares+lbfgs")
     assert (chain.is_global, chain.uses_gradient, chain.is_stochastic, chain.needs_residuals) == (True,) * 4
     local = identifier("bobyqa+nelder_mead")
     assert (local.is_global, local.uses_gradient, local.needs_residuals) == (False,) * 3
     assert identifier("multistart:bobyqa").is_global
     assert identifier_of("pso", OWN) is IDENTIFIERS["pso"]
+    for name in ("multistart:bobyqa", "random+multistart:bobyqa"):
+        few, many = Bowl(), Bowl()
+        ran(name, few, 200, **{"bobyqa.tolerance": 0.0})
+        ran(name, many, 200, **{"bobyqa.tolerance": 0.02})
+        assert jumps(many) > jumps(few) + 3
 
 
 @pytest.mark.parametrize("name", ["evolution+bobyqa", "evolution+mine", "pso+mine+bobyqa", "multistart:mine",
@@ -79,14 +87,6 @@ def test_a_user_s_own_takes_part(name: str) -> None:
     assert f.min() < f[:100].min()
     if name == "evolution+mine":
         np.testing.assert_allclose(asked[200], asked[np.argmin(f[:200])], rtol=1e-12)
-
-
-def test_options_reach_the_local_one_of_a_multistart_also_in_a_chain() -> None:
-    for name in ("multistart:bobyqa", "random+multistart:bobyqa"):
-        few, many = Bowl(), Bowl()
-        ran(name, few, 200, **{"bobyqa.tolerance": 0.0})
-        ran(name, many, 200, **{"bobyqa.tolerance": 0.02})
-        assert jumps(many) > jumps(few) + 3
 
 
 def jumps(problem: Bowl) -> int:
@@ -117,9 +117,7 @@ def test_cma_es_starts_again_with_twice_the_population() -> None:
 
 
 @pytest.mark.parametrize("name", ["cmaes", "cmaes+bobyqa"])
-def test_cma_es_is_silent_and_draws_from_nobody_else(
-    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_cma_es_is_silent_and_draws_from_nobody_else(name, tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
     random.seed(5)
     np.random.seed(5)
@@ -134,3 +132,39 @@ def test_cma_es_is_silent_and_draws_from_nobody_else(
     assert capfd.readouterr() == ("", "")
     assert random.getstate() == before[0]
     np.testing.assert_array_equal(np.random.get_state()[1], before[1])  # type: ignore[index]
+
+
+# The paper's Table I.
+ROWS = {
+    "row 1": (3.2e6, 1.0, 0.62, 1.0), "row 2": (3.1e6, 0.95, 0.60, 1.1), "row 3": (3.0e6, 0.90, 0.58, 1.2),
+    "row 4": (2.9e6, 0.85, 0.55, 1.3), "row 5": (2.8e6, 0.80, 0.50, 1.4),
+}  # fmt: skip
+CLEAN = ("--noise-deg-s", "0", "--quantisation-deg-s", "0", "--repeats", "1", "--manoeuvres", "lower", "--holdout", "",
+         "--duration", "0.7")  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("truth", ROWS.values(), ids=ROWS)
+@pytest.mark.parametrize("name", ["least_squares", "pso+least_squares"])
+def test_all_four_within_a_millionth_of_the_truth(stand, arm: Model, truth: tuple[float, ...], name: str) -> None:
+    told = [word for name, value in zip(("p0", "k", "eta3", "n"), truth) for word in (f"--{name}", repr(value))]
+    campaign = read_campaign(stand(*CLEAN, *told))
+    space = space_of(arm)
+    ready = replays(campaign.train, arm, space)
+    for seed in range(1, 11):
+        meter = Meter(3000)
+        problem = IdentificationProblem(space, ready, FITNESS["rmse"], meter)
+        minimize(problem, identifier(name).build(3000), MeterTermination(meter), seed=seed, copy_algorithm=False)
+        assert np.abs(meter.best_x / truth - 1.0).max() < 1e-6
+        assert meter.used < 3000
+
+
+def test_one_run_from_a_chain(lowering: Campaign, arm: Model, arm_space) -> None:
+    found = identify(lowering, arm, arm_space, FITNESS["likelihood"], identifier("pso+least_squares"), 400, seed=3)
+    assert found.identifier == "pso+least_squares"
+    assert 200 < found.used < 400
+    assert found.stopped == "pso+least_squares stopped by itself"
+    alone = identify(lowering, arm, arm_space, FITNESS["likelihood"], identifier("least_squares"), 400, seed=4)
+    assert alone.used < 100
+    assert found.value == pytest.approx(alone.value, rel=1e-9)
+    np.testing.assert_allclose(found.candidate, alone.candidate, rtol=1e-5)

@@ -68,10 +68,13 @@ def test_a_start_without_fitness_is_drawn_again(name: str) -> None:
     assert problem.unit(result.X)[0] <= 0.1
 
 
-def test_where_all_fails_the_budget_is_the_end() -> None:
+def test_where_all_fails_the_budget_is_the_end_and_a_tolerance_ends_a_search_earlier() -> None:
     result = ran("bobyqa", Bowl(fail_above=-1.0), 30)
     assert result.algorithm.evaluator.n_eval == 30
     assert result.X is None
+    used = [ran("bobyqa", Bowl(), 300, tolerance=t).algorithm.evaluator.n_eval for t in (1e-2, 1e-9)]
+    assert used[0] < used[1] < 300
+    assert identifier("bobyqa", tolerance=0).build(10).budget == 10
 
 
 def quadratic(u: Array) -> Array:
@@ -109,12 +112,6 @@ def test_derivatives_are_one_population_and_counted(kind: str, size: int) -> Non
     # linear residuals: the first Gauss-Newton step is the solution
     assert result.F[0] == pytest.approx(float(np.linalg.lstsq(problem.A, problem.b, rcond=None)[1][0]), rel=1e-9)
     assert "residuals" not in result.pop[0].data
-
-
-def test_a_tolerance_ends_a_search_earlier() -> None:
-    used = [ran("bobyqa", Bowl(), 300, tolerance=t).algorithm.evaluator.n_eval for t in (1e-2, 1e-9)]
-    assert used[0] < used[1] < 300
-    assert identifier("bobyqa", tolerance=0).build(10).budget == 10
 
 
 class EnoughError(Exception):

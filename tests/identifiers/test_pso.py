@@ -68,7 +68,7 @@ def test_moves_as_the_equations_say(limit: str | float, fraction: float) -> None
     np.testing.assert_array_equal(bests, literal)
 
 
-def test_the_paper_s_settings_make_12000_evaluations() -> None:
+def test_the_paper_s_settings_make_12000_evaluations_and_every_evaluator_gives_the_same_run() -> None:
     for termination in (("n_eval", 12000), ("n_iter", 150), None):
         result = minimize(Valley(), PaperPSO(), termination, seed=1)
         assert result.algorithm.evaluator.n_eval == 12000
@@ -76,9 +76,6 @@ def test_the_paper_s_settings_make_12000_evaluations() -> None:
         assert result.algorithm.n_gen - 1 == 150
     assert minimize(Valley(), PaperPSO(), ("n_gen", 200), seed=1).algorithm.evaluator.n_eval == 16000
     assert minimize(Valley(), PaperPSO(termination=("n_gen", 3)), seed=1).algorithm.evaluator.n_eval == 240
-
-
-def test_every_evaluator_gives_the_same_run() -> None:
     light = minimize(Valley(), PaperPSO(), seed=5)
     plain = minimize(Valley(), PaperPSO(), seed=5, evaluator=Evaluator())
     given = minimize(Valley(), PaperPSO(evaluator=Evaluator()), seed=5)
@@ -86,8 +83,6 @@ def test_every_evaluator_gives_the_same_run() -> None:
         np.testing.assert_array_equal(other.pop.get("X"), light.pop.get("X"))
         assert other.algorithm.evaluator.n_eval == light.algorithm.evaluator.n_eval == 12000
 
-
-def test_values_of_the_problem_beside_the_fitness_reach_the_individuals() -> None:
     class Talkative(Valley):
         def _evaluate(self, x: Array, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
             super()._evaluate(x, out, *args, **kwargs)
@@ -126,17 +121,6 @@ def test_the_catalogue_stretches_the_schedule_over_the_budget() -> None:
             IDENTIFIERS["pso"].build(wrong)  # type: ignore[arg-type]
 
 
-def a_small_swarm(budget: int) -> PaperPSO:
-    return PaperPSO(n_particles=4, n_iterations=budget // 4)
-
-
-def test_an_algorithm_that_was_used_keeps_its_state_and_is_refused() -> None:
-    used = a_small_swarm(40)
-    used.problem = object()
-    with pytest.raises(ValueError, match="is a PaperPSO that was used already, expected a subclass"):
-        as_identifier("mine", used)
-
-
 @pytest.mark.parametrize(("obj", "sentence"), [
     (3, "is 3, expected a subclass of pymoo's Algorithm, a function of the budget"),
     (dict, "expected a subclass"), (lambda budget, more: PaperPSO(), "expected a subclass"),
@@ -146,4 +130,8 @@ def test_as_identifier_refuses(obj: Any, sentence: str) -> None:
     with pytest.raises(ValueError, match=sentence):
         as_identifier("mine", obj).build(10)
     with pytest.raises(ValueError, match="takes no options"):
-        as_identifier("mine", a_small_swarm).with_options({"pop_size": 10})
+        as_identifier("mine", lambda budget: PaperPSO(n_particles=4)).with_options({"pop_size": 10})
+    used = PaperPSO(n_particles=4)
+    used.problem = object()
+    with pytest.raises(ValueError, match="is a PaperPSO that was used already, expected a subclass"):
+        as_identifier("mine", used)

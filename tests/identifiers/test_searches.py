@@ -55,18 +55,14 @@ LOCAL_OR_BETTER = [
 ]
 
 
-def at_a_corner() -> Bowl:
-    """A bowl whose optimum lies on two bounds."""
-    return Bowl((3.5, 1.0, 3.0, 2.5))
-
-
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_cmaes_in_one_dimension_when_its_step_grows_to_the_range(seed: int) -> None:
     problem = FunctionalProblem(1, lambda x: (x[0] - 1.0) ** 2, xl=0.0, xu=1.0)
     assert ran("cmaes", problem, 200, seed=seed, initial_step=0.9).X[0] > 0.999
 
 
-@pytest.mark.parametrize(("problem", "n_at_bounds", "near"), [(Bowl, 0, 2e-5), (at_a_corner, 2, 1e-4)])
+@pytest.mark.parametrize(("problem", "n_at_bounds", "near"), [
+    (Bowl, 0, 2e-5), (lambda: Bowl((3.5, 1.0, 3.0, 2.5)), 2, 1e-4)], ids=["inside", "on two bounds"])  # fmt: skip
 @pytest.mark.parametrize("name", LOCAL_OR_BETTER)
 def test_finds_what_linear_algebra_finds(name: str, problem: Any, n_at_bounds: int, near: float) -> None:
     problem = problem()
@@ -129,12 +125,7 @@ def test_an_error_of_the_problem_comes_out_and_no_thread_is_left(name: str) -> N
         assert threading.enumerate() == before
 
 
-def test_offspring_of_differential_evolution_are_no_more_than_its_population() -> None:
-    with pytest.raises(ArmidError, match="n_offsprings of 'de' is 60, at most its pop_size of 40 is expected"):
-        IDENTIFIERS["de"].with_options({"n_offsprings": 60}).build(200)
-
-
-def test_what_minimize_would_swallow_is_refused() -> None:
+def test_what_minimize_would_swallow_and_more_offspring_than_parents_are_refused() -> None:
     with pytest.raises(ArmidError, match="no option 'sede', did you mean 'seed'"):
         minimize(Bowl(), identifier("bobyqa").build(10), sede=3)
     with pytest.raises(ArmidError, match="no option 'terminaton'"):
@@ -146,6 +137,8 @@ def test_what_minimize_would_swallow_is_refused() -> None:
             getattr(identifier("bobyqa").build(10).setup(Bowl()), step)()
     with pytest.raises(ArmidError, match="2 objectives"):
         minimize(get_problem("zdt1"), identifier("cmaes").build(10))
+    with pytest.raises(ArmidError, match="n_offsprings of 'de' is 60, at most its pop_size of 40 is expected"):
+        IDENTIFIERS["de"].with_options({"n_offsprings": 60}).build(200)
 
 
 def test_capabilities_are_true() -> None:
@@ -171,18 +164,15 @@ def wrapping(value: Any, low: Any, high: Any) -> None:
         raise RuntimeError("in the library") from error
 
 
-def test_an_error_that_a_library_wraps_comes_out_and_a_failure_stays_finite() -> None:
+def test_an_error_that_a_library_wraps_comes_out_and_a_package_that_is_missing_is_named() -> None:
     meter, _ = run(as_identifier("wrapping", wrapping), 1)
     assert meter.used == 403
     with pytest.raises(RuntimeError, match="in the library"):
         run(as_identifier("wrapping", wrapping), 1, Trial(Meter(403), holes=True))
+    with pytest.raises(ArmidError, match="'absent' needs the package no_such_package, which is not installed"):
+        declared("absent", "", Absent, "LN_BOBYQA").build(100)
 
 
 @dataclass(frozen=True)
 class Absent(ByValues):
     package = "no_such_package"
-
-
-def test_a_package_that_is_missing_is_named() -> None:
-    with pytest.raises(ArmidError, match="'absent' needs the package no_such_package, which is not installed"):
-        declared("absent", "", Absent, "LN_BOBYQA").build(100)

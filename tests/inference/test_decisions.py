@@ -3,8 +3,6 @@
 import ast
 from pathlib import Path
 
-import pytest
-
 import armid
 from armid.inference import decisions
 
@@ -47,16 +45,13 @@ def compared(tree, kind):
             yield from (part for part in ast.walk(node) if isinstance(part, kind))
 
 
-def test_no_other_constant_decides():
+def test_no_other_constant_and_no_plain_number_decides():
     known = {name for names in NUMERICS.values() for name in names}
     trees = {file: ast.parse(file.read_text()) for file in FILES if file.name != "decisions.py"}
     mine = {name for tree in trees.values() for name in numbers_of(tree) if name.isupper()}
     used = {part.id for tree in trees.values() for part in compared(tree, ast.Name)}
     assert mine & used <= known
     assert known <= used, "a name of the list is compared with nowhere"
-
-
-def test_no_plain_number_decides():
     for file in FILES:
         for part in compared(ast.parse(file.read_text()), ast.Constant):
             if isinstance(part.value, (int, float)) and not isinstance(part.value, bool):
@@ -65,15 +60,12 @@ def test_no_plain_number_decides():
                 )
 
 
-def test_the_list_is_short_and_every_number_of_it_is_used():
+def test_the_list_is_short_and_every_number_of_it_is_used_and_says_why():
     names = [name for name in vars(decisions) if name.isupper()]
     assert len(names) <= MOST
     text = "\n".join(file.read_text() for file in FILES if file.name != "decisions.py")
     assert [name for name in names if name not in text] == []
-
-
-@pytest.mark.parametrize("name", [name for name in vars(decisions) if name.isupper()])
-def test_each_says_why(name):
     lines = Path(decisions.__file__).read_text().splitlines()
-    place = next(i for i, line in enumerate(lines) if line.startswith(f"{name} ="))
-    assert lines[place - 1].startswith("# ")
+    for name in names:
+        place = next(i for i, line in enumerate(lines) if line.startswith(f"{name} ="))
+        assert lines[place - 1].startswith("# "), name

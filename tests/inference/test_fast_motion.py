@@ -22,9 +22,7 @@ pytestmark = pytest.mark.slow
 MASS, NOISE, STEP_S, N = 2.0, 0.02, 0.05, 200
 
 
-@pytest.fixture(scope="module")
-def fast(tmp_path_factory):
-    """A campaign of three records whose force changes with each sample, so that the speed is known in closed form."""
+def test_noise_without_a_rest_is_what_the_declared_model_leaves_and_one_that_diverges_does_not_count(tmp_path_factory):
     rng, tables = np.random.default_rng(4), {}
     for file in ("a.csv", "b.csv", "c.csv"):
         force = rng.normal(0.0, 20.0, N)
@@ -32,16 +30,8 @@ def fast(tmp_path_factory):
         tables[file] = {"time_s": STEP_S * np.arange(N), "velocity_m_s": speed + NOISE * rng.standard_normal(N),
                         "drive_N": force}  # fmt: skip
     head = 'name = "fast"\nplant = "driven_axis"\nhold = "zero"\n'
-    return read_campaign(write_records(tmp_path_factory.mktemp("fast"), head, tables))
-
-
-@pytest.fixture(scope="module")
-def fitted(fast):
-    return prepared(Model(fast.plant), fast, {"viscous": EFFECTS["viscous"]})
-
-
-def test_noise_without_a_rest_is_that_of_what_the_declared_model_leaves(fast, fitted):
-    library, declared = fitted
+    fast = read_campaign(write_records(tmp_path_factory.mktemp("fast"), head, tables))
+    library, declared = prepared(Model(fast.plant), fast, {"viscous": EFFECTS["viscous"]})
     assert min(r.noise.rms for r in fast.train) > 5.0 * NOISE
     assert [level.known for level in library.data.levels] == [False, False]
     for level in library.data.levels:
@@ -50,10 +40,6 @@ def test_noise_without_a_rest_is_that_of_what_the_declared_model_leaves(fast, fi
     assert declared.values["mass"] == pytest.approx(MASS, rel=0.01)
     unseen = holdout_residuals(declared, fast.holdout, library)
     assert [level.rms for level in unseen.data.levels] == [library.data.levels[0].rms]
-
-
-def test_an_estimate_does_not_count_where_every_candidate_near_it_diverges(fitted):
-    _, declared = fitted
     assert unless_diverged(lambda: declared) is declared
     alone = type(declared)(declared.active, declared.records, declared.z, declared.residual)
     alone.__dict__["jacobian"] = np.zeros_like(declared.jacobian)

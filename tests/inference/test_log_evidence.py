@@ -58,20 +58,6 @@ def test_a_forecast_is_the_bayes_factor_of_a_linear_model(deviation):
     assert found.total == pytest.approx(exact(residual, column, deviation), abs=1e-5)
 
 
-def test_columns_that_act_together_have_the_bayes_factor_of_their_sum():
-    columns, residual = RNG.normal(size=(4, N)), RNG.normal(size=N)
-    found = forecast(expansion(residual), proposal(columns, [0.7], joint=True))
-    assert found.total == pytest.approx(exact(residual, columns, 0.7), abs=1e-5)
-
-
-def test_the_sides_of_a_strength_share_its_probability():
-    """A strength of either sign is as probable as its two one-sided halves together."""
-    column, residual = RNG.normal(size=(1, N)), RNG.normal(size=N)
-    either = forecast(expansion(residual), proposal(column, [2.0]))
-    halves = [forecast(expansion(residual), proposal(side * column, [2.0], one_sided=True)) for side in (1.0, -1.0)]
-    assert np.logaddexp(*(h.total for h in halves)) - np.log(2.0) == pytest.approx(either.total, abs=1e-6)
-
-
 @pytest.mark.parametrize("off", [0.0, 1.0, 4.0])
 def test_a_constant_may_be_off_as_its_tolerance_may_be_wrong(off):
     """Against the mixture of two normal densities; other unknowns, such as the size of a fault, have no such tail."""
@@ -80,35 +66,34 @@ def test_a_constant_may_be_off_as_its_tolerance_may_be_wrong(off):
     assert log_tails(SimpleNamespace(others=others)) == pytest.approx(np.log(mixture / norm.pdf(off)))
 
 
-def test_what_the_unknowns_can_do_says_nothing():
+def test_forecasts_of_columns_together_of_sides_of_what_unknowns_can_do_and_of_tempered_scales():
+    columns, residual = RNG.normal(size=(4, N)), RNG.normal(size=N)
+    found = forecast(expansion(residual), proposal(columns, [0.7], joint=True))
+    assert found.total == pytest.approx(exact(residual, columns, 0.7), abs=1e-5)
+    # A strength of either sign is as probable as its two one-sided halves together.
+    column, residual = RNG.normal(size=(1, N)), RNG.normal(size=N)
+    either = forecast(expansion(residual), proposal(column, [2.0]))
+    halves = [forecast(expansion(residual), proposal(side * column, [2.0], one_sided=True)) for side in (1.0, -1.0)]
+    assert np.logaddexp(*(h.total for h in halves)) - np.log(2.0) == pytest.approx(either.total, abs=1e-6)
     column = (JACOBIAN @ np.array([0.1, -0.2]))[np.newaxis]
     found = forecast(expansion(RNG.normal(size=N)), proposal(column, [1.0]))
     assert found.total == pytest.approx(0.0, abs=0.3)
-
-
-def test_a_tempered_scale_weighs_less_and_a_short_rest_still_less():
     column = RNG.normal(size=(1, N))
     residual = RNG.normal(size=N) + 3.0 * column[0]
     totals = [forecast(expansion(residual, scale), proposal(column, [3.0])).total
               for scale in (Scale(N, 1.0, 1e9), Scale(N, 1.0, 20.0), Scale(6.0, 0.01, 0.1))]  # fmt: skip
     assert totals[0] > totals[1] > totals[2] > 0.0
-
-
-def test_a_sum_of_squares_is_found_again_from_its_log_likelihood():
     scale = Scale(40.0, 0.3, 12.0)
     assert scale.reach(scale.log_likelihood(321.0)) == pytest.approx(321.0)
 
 
-def test_unknowns_that_are_projected_out_are_those_of_a_joint_fit():
+def test_unknowns_that_are_projected_out_are_those_of_a_joint_fit_and_prior_odds_are_shared_out():
     """min over z of the projected problem is min over z and v of |r - C v|^2 + |v|^2."""
     columns, residual = RNG.normal(size=(N, 3)), RNG.normal(size=N)
     white = Cover.of(columns).white(residual)
     best = np.linalg.solve(np.eye(3) + columns.T @ columns, columns.T @ residual)
     left = residual - columns @ best
     assert white @ white == pytest.approx(left @ left + best @ best)
-
-
-def test_prior_odds_are_shared_out():
     beliefs = Calibration(1.0, {"effect": 0.7}, {"coulomb": 4.0})
     odds = (0.7 / 36) / (1 - 0.7 / 36)
     assert np.exp(beliefs.log_odds("effect", 36)) == pytest.approx(odds)
@@ -122,11 +107,25 @@ def test_a_p_value_allows_so_much_evidence_against_noise(p, odds):
     assert most_odds(p) == pytest.approx(odds, rel=1e-4)
 
 
-def test_a_temperature_makes_evidence_weaker_and_leaves_the_prior():
+def test_a_temperature_makes_evidence_weaker_names_count_without_unknown_signals_and_causes_are_shares():
     atoms = tuple(Atom(e, p, frozenset({("effect", n)}), np.zeros(1), np.ones(1))
                   for e, p, n in ((np.log(9.0), 0.0, "a"), (0.0, np.log(2.0), "b")))  # fmt: skip
     assert Posterior(atoms, ("p",)).weights == pytest.approx([9 / 11, 2 / 11])
     assert Posterior(atoms, ("p",), 2.0).weights == pytest.approx([3 / 5, 2 / 5])
+    plain, beside = frozenset({("effect", "a")}), frozenset({("effect", "a"), ("unknown", "torque")})
+    found = Posterior(tuple(Atom(0.0, 0.0, names, np.zeros(1), np.ones(1)) for names in (plain, beside)), ("p",))
+    assert found.probability("effect", "a") == pytest.approx(0.5)
+    assert found.probability("unknown") == pytest.approx(0.5)
+    # Two models as probable, far apart: their distance is nearly all, and no more than all.
+    atoms = tuple(
+        Atom(0.0, 0.0, frozenset({("effect", n)}), np.array([m]), np.ones(1)) for n, m in (("a", 0.0), ("b", 9.0))
+    )
+    causes = dict(Posterior(atoms, ("p",)).causes("p", 1.0))
+    assert causes["noise"] == pytest.approx(1.0 / (1.0 + 4.5**2))
+    assert sum(causes.values()) == pytest.approx(1.0)
+    # one model is in force, and another, sharper one has nearly all of the weight
+    atoms = (Atom(0.0, 0.0, frozenset(), np.zeros(1), np.array([0.1])), atoms[1])
+    assert all(share <= 1.0 for share in dict(Posterior(atoms, ("p",)).causes("p", 30.0)).values())
 
 
 def test_the_mixture_has_the_quantiles_of_its_samples():
@@ -155,26 +154,6 @@ def test_where_something_unknown_acts_a_move_of_the_names_is_doubted_whole():
     assert high > 8.0
     assert replace(wrong, known=0.5).interval("p") == pytest.approx((5.0 - 0.98, 5.0 + 0.98), abs=1e-3)
     assert dict(wrong.causes("p", 0.1, "something unknown"))["something unknown"] > 0.99
-
-
-def test_the_causes_of_a_width_are_shares_of_it():
-    """Two models as probable, far apart: their distance is nearly all, and no more than all."""
-    atoms = tuple(
-        Atom(0.0, 0.0, frozenset({("effect", n)}), np.array([m]), np.ones(1)) for n, m in (("a", 0.0), ("b", 9.0))
-    )
-    causes = dict(Posterior(atoms, ("p",)).causes("p", 1.0))
-    assert causes["noise"] == pytest.approx(1.0 / (1.0 + 4.5**2))
-    assert sum(causes.values()) == pytest.approx(1.0)
-    # one model is in force, and another, sharper one has nearly all of the weight
-    atoms = (Atom(0.0, 0.0, frozenset(), np.zeros(1), np.array([0.1])), atoms[1])
-    assert all(share <= 1.0 for share in dict(Posterior(atoms, ("p",)).causes("p", 30.0)).values())
-
-
-def test_names_count_only_in_sets_without_an_unknown_signal():
-    plain, beside = frozenset({("effect", "a")}), frozenset({("effect", "a"), ("unknown", "torque")})
-    found = Posterior(tuple(Atom(0.0, 0.0, names, np.zeros(1), np.ones(1)) for names in (plain, beside)), ("p",))
-    assert found.probability("effect", "a") == pytest.approx(0.5)
-    assert found.probability("unknown") == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize("at", [-8.0, -2.0, 0.0, 3.0])

@@ -1,7 +1,9 @@
 """Which models are fitted: those in the window, free shapes, other forms, pairs; what is kept of them."""
 
 from dataclasses import replace
+from importlib import import_module
 from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -142,15 +144,12 @@ def exploration(posteriors, expanded=(), misfit=False, monkeypatch=None):
     return found
 
 
-def test_the_most_probable_model_that_is_not_expanded_comes_next(monkeypatch):
+def test_the_most_probable_model_comes_next_that_is_neither_expanded_nor_outdone_by_a_smaller_one(monkeypatch):
     posteriors = {"ab": 0.0, "ac": -0.5, "d": -WINDOW + 0.1, "e": -WINDOW - 0.1}
     order = []
     while (one := next_model(exploration(posteriors, order, monkeypatch=monkeypatch))) is not None:
         order.append("".join(sorted(h.name for h in one)))
     assert order == ["ab", "ac", "d"]
-
-
-def test_beside_a_model_that_a_smaller_one_outdoes_nothing_is_looked_for(monkeypatch):
     posteriors = {"a": 0.0, "ab": -1.0, "c": -2.0}
     ranked = exploration(posteriors, monkeypatch=monkeypatch).ranked()
     assert [is_outdone(m, p, ranked) for m, p in ranked] == [False, True, False]
@@ -172,15 +171,8 @@ def test_where_more_than_noise_is_left_the_best_of_each_size_lead_on(monkeypatch
     assert next_model(exploration({large: 0.0}, (), False, monkeypatch)) is None
 
 
-class Leaves:
-    """A fit of which nothing is asked but what it leaves."""
-
-    def __init__(self, chi2):
-        self.chi2 = chi2
-
-
 def test_a_fit_from_a_nearer_start_takes_the_place_of_a_local_one_and_its_evidence_is_its_own(monkeypatch):
-    local, better = Leaves(120.0), Leaves(100.0)
+    local, better = Mock(chi2=120.0), Mock(chi2=100.0)
     monkeypatch.setattr(search, "expansion_of", lambda fit, *_: fit)
     monkeypatch.setattr(search, "log_evidence", lambda fit: -0.5 * fit.chi2)
     monkeypatch.setattr(Exploration, "scale", lambda _: None)
@@ -190,12 +182,12 @@ def test_a_fit_from_a_nearer_start_takes_the_place_of_a_local_one_and_its_eviden
     assert found.take(key, better)
     assert not found.take(key, local)
     assert not found.take(key, None)
-    assert not found.take(key, Leaves(np.nan))
+    assert not found.take(key, Mock(chi2=np.nan))
     assert found.fits == {key: better}
     # what is freed leaves its address to what comes next
     for chi2 in range(20):
         found.fits.clear()
-        found.fits[key] = Leaves(float(chi2))
+        found.fits[key] = Mock(chi2=float(chi2))
         assert found.log_posterior(key, "a scale") == -0.5 * chi2
 
 
@@ -207,3 +199,22 @@ def test_keys_and_what_they_own():
     assert key.owns("flux_saturation_atan.level")
     assert not key.owns("flux_saturation_atan2.level")
     assert EffectKey("error_of_R").public == "constant:R"
+
+
+CARRY_OVER = import_module("armid.inference.carry_over")
+NONE, ONE, TWO = (frozenset(Hypothesis("effect", n) for n in names) for names in ((), ("a",), ("a", "b")))
+LIBRARY = SimpleNamespace(say=lambda _: None, each=lambda work, items: [work(x) for x in items])
+
+
+@pytest.mark.parametrize(("squares", "best"), [
+    # Two effects miss each part by half as much, but for the loudest one, which alone would decide a mean.
+    ([[9e3, 40, 30, 20, 60], [5e3, 20, 16, 10, 32], [6e3, 10, 7, 5, 15]], TWO),
+    # A second effect predicts parts better and worse in turn: the fewest effects within one standard error.
+    ([[90, 80, 99, 85, 95], [20, 21, 22, 19, 20], [14, 26, 24, 13, 21]], ONE),
+    ([[2, 2, 2, 2, 2], [3, 3, 3, 3, 3], [4, 4, 4, 4, 4]], NONE),
+    ([[2, 2, 2, 2, 2], [1, 1, 1, 1, 1], [1, np.inf, 1, 1, 1]], ONE),
+])  # fmt: skip
+def test_the_fewest_effects_that_predict_as_the_best_are_in_force(monkeypatch, squares, best):
+    fits = dict(zip((NONE, ONE, TWO), squares, strict=True))
+    monkeypatch.setattr(CARRY_OVER, "misses", np.log)
+    assert CARRY_OVER.predicting_best((TWO, NONE, ONE), fits, LIBRARY) == best

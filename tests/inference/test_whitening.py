@@ -32,10 +32,16 @@ def autocovariance(terms, n):
     return np.array([response[: 4000 - k] @ response[k:] for k in range(n)])
 
 
-def test_yule_walker_finds_the_terms_from_the_exact_covariance():
+def test_yule_walker_finds_the_terms_and_pieces_are_filtered_each_on_its_own():
     terms, variance = yule_walker(autocovariance(TERMS, 3), 2)
     np.testing.assert_allclose(terms, TERMS, rtol=1e-9)
     assert variance == pytest.approx(1.0, rel=1e-9)
+    rng = np.random.default_rng(2)
+    level = coloured_level([lfilter([1.0], [1.0, *-TERMS], rng.standard_normal(3000))], 3.0, 3000)
+    values = rng.standard_normal((3, 50))
+    both = level.white(values, [20, 30])
+    np.testing.assert_array_equal(both[:, :20], level.white(values[:, :20], [20]))
+    np.testing.assert_array_equal(both[:, 20:], level.white(values[:, 20:], [30]))
 
 
 def test_filter_turns_the_covariance_into_the_unit_matrix():
@@ -49,15 +55,6 @@ def test_filter_turns_the_covariance_into_the_unit_matrix():
     covariance = toeplitz(autocovariance(TERMS, 40))
     whitened = level.white(level.white(covariance, [40]).T, [40])
     np.testing.assert_allclose(whitened, np.eye(40), atol=0.06)
-
-
-def test_pieces_are_filtered_each_on_its_own():
-    rng = np.random.default_rng(2)
-    level = coloured_level([lfilter([1.0], [1.0, *-TERMS], rng.standard_normal(3000))], 3.0, 3000)
-    values = rng.standard_normal((3, 50))
-    both = level.white(values, [20, 30])
-    np.testing.assert_array_equal(both[:, :20], level.white(values[:, :20], [20]))
-    np.testing.assert_array_equal(both[:, 20:], level.white(values[:, 20:], [30]))
 
 
 def test_coloured_noise_counts_fewer_samples():

@@ -49,14 +49,7 @@ def whole(axis):
     return segments(tested, space, np.empty(0), ready, [NOISE] * 3, ["torque", "output"])
 
 
-def test_the_gain_of_a_force_is_its_impulse_over_the_mass(whole):
-    segment = whole[0]
-    width = segment.knots[1] - segment.knots[0]
-    assert np.allclose(segment.gains["torque"][-1, 5:-1] * NOISE, width / MASS, rtol=1e-3)
-    assert np.allclose(segment.gains["output"][20:380].sum(axis=1) * NOISE, 1.0, rtol=1e-4)
-
-
-def test_the_missing_force_is_recovered_without_a_form(axis, whole):
+def test_the_missing_force_is_recovered_without_a_form_by_gains_of_an_impulse_over_the_mass(axis, whole):
     found = missing_signal(whole, "torque")
     assert found.share > 0.99
     for segment, signal in zip(whole, found.signals, strict=True):
@@ -64,6 +57,10 @@ def test_the_missing_force_is_recovered_without_a_form(axis, whole):
         position = np.cumsum(segment.replays[0].record.measured) * 0.005
         truth = spring(np.interp(segment.knots, times, position))
         assert np.sqrt(np.mean((signal - truth)[3:-3] ** 2)) < 0.15 * np.ptp(truth)
+    segment = whole[0]
+    width = segment.knots[1] - segment.knots[0]
+    assert np.allclose(segment.gains["torque"][-1, 5:-1] * NOISE, width / MASS, rtol=1e-3)
+    assert np.allclose(segment.gains["output"][20:380].sum(axis=1) * NOISE, 1.0, rtol=1e-4)
 
 
 def test_the_variable_is_the_position_and_the_curve_is_the_spring(axis, whole):

@@ -158,7 +158,7 @@ def test_hum_is_noise(campaign, sound):
     assert mains_hum(sound.before.train) == []
 
 
-def test_a_shift_is_undone_where_it_was_measured(campaign):
+def test_a_shift_is_undone_where_it_was_measured_and_a_drift_that_may_be_none_says_so(campaign):
     record = campaign.records[0]
     fault = Fault("late")
     there = trimmed(fault, fault.undone(record, -0.005, ARM), 0.005, ARM)
@@ -166,9 +166,6 @@ def test_a_shift_is_undone_where_it_was_measured(campaign):
     assert inside.stop == record.pieces[0].window.stop - 7
     inner = slice(20, inside.stop - 20)
     assert np.abs(there.measured[inner] - record.measured[inner]).max() < 1e-6
-
-
-def test_a_drift_that_may_be_none_says_so():
     drift = RecordFault("b.csv", "train", "trend", "freed", 1.5e-5, "N m", -1.70e-3, 1.73e-3, parameter="gravity")
     assert "gravity is 1.5e-05 N m (-0.0017 to 0.00173) larger in b.csv" in fault_sentence(drift)
     late = RecordFault("b.csv", "train", "late", "freed", -0.004, "s", -0.005, 0.001)

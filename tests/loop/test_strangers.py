@@ -15,15 +15,13 @@ MASS, DAMPING, STEP_MM, OWN_MM, LATE_S = 4.1, 47.0, 0.02, 0.008, 0.013
 INERTIA, TORQUE_CONSTANT, FRICTION, MOMENT, RESISTANCE, DEAD_V = 0.02, 0.25, 0.01, 0.15, 1.2, 0.8
 
 
-def accelerate(drive_effort, drive, torque, damping, speed, mass):
-    return (drive_effort + drive + torque - damping * speed) / mass
-
-
 CARRIAGE = Plant(
     "carriage",
     parameters=(Parameter("mass", "kg", 0.5, 15.0), Parameter("damping", "N s/m", 0.0, 200.0)),
     states=(State("position", "m", lambda speed: speed, lambda start_position: start_position, "position_m"),
-            State("speed", "m/s", accelerate, lambda start_speed: start_speed, "speed_m_s")),
+            State("speed", "m/s", lambda drive_effort, drive, torque, damping, speed, mass:
+                  (drive_effort + drive + torque - damping * speed) / mass,
+                  lambda start_speed: start_speed, "speed_m_s")),
     quantities={"drive_effort": lambda force: force,
                 "shown": lambda position, position_sensor: position + position_sensor},
     constants=(Constant("start_position", 0.0, "m"), Constant("start_speed", 0.0, "m/s")),
@@ -33,22 +31,18 @@ CARRIAGE = Plant(
 )  # fmt: skip
 
 
-def back(winding, torque_constant, v, resistance):
-    return torque_constant * (winding - torque_constant * v) / resistance
-
-
-def turn(drive_effort, drive, back, eccentric_moment, q, friction, v, torque, inertia):
-    return (drive_effort + drive + back - eccentric_moment * np.sin(q) - friction * v + torque) / inertia
-
-
 DISC = Plant(
     "disc",
     parameters=(Parameter("inertia", "kg m2", 0.002, 0.1), Parameter("torque_constant", "N m/A", 0.05, 1.0),
                 Parameter("friction", "N m s/rad", 0.0, 0.1), Parameter("eccentric_moment", "N m", 0.0, 1.0)),
     states=(State("q", "rad", lambda v: v, lambda: 0.0, "angle_rad"),
-            State("v", "rad/s", turn, lambda: 0.0, "speed_rad_s")),
+            State("v", "rad/s", lambda drive_effort, drive, back, eccentric_moment, q, friction, v, torque, inertia:
+                  (drive_effort + drive + back - eccentric_moment * np.sin(q) - friction * v + torque) / inertia,
+                  lambda: 0.0, "speed_rad_s")),
     quantities={"drive_effort": lambda torque_constant, voltage, resistance: torque_constant * voltage / resistance,
-                "back": back, "shown": lambda v, output: v + output},
+                "back": lambda winding, torque_constant, v, resistance:
+                    torque_constant * (winding - torque_constant * v) / resistance,
+                "shown": lambda v, output: v + output},
     constants=(Constant("resistance", RESISTANCE, "ohm"),),
     inputs=(Input("voltage", "V", ("voltage_V",), hold="zero"),),
     ports={"torque": "N m", "drive": "N m", "winding": "V", "output": "rad/s"},
@@ -144,17 +138,15 @@ def from_counts(motion, rng):
     return np.diff(counts, prepend=counts[0]) * 2.0 * np.pi / COUNTS / 0.01
 
 
-def dragged(x, fed):
-    return turning(x, fed) - np.array([0.0, DRAG * x[1] * abs(x[1]) / INERTIA])
-
-
 @pytest.mark.parametrize("sensor", [by_reading, from_counts])
 def test_noise_that_no_rest_tells_is_nothing_that_the_machine_lacks(tmp_path, sensor):
     rng, files = np.random.default_rng(31), []
     for _ in range(4):
         voltage = np.repeat(rng.uniform(-9.0, 9.0, 15), 40)
         voltage[:60] = 0.0
-        speed = sensor(moved(dragged, voltage, 0.01, (0.0, 0.0), "zero", 4), rng)
+        motion = moved(lambda x, fed: turning(x, fed) - [0.0, DRAG * x[1] * abs(x[1]) / INERTIA], voltage, 0.01,
+                       (0.0, 0.0), "zero", 4)  # fmt: skip
+        speed = sensor(motion, rng)
         files.append({"time_s": 0.01 * np.arange(len(voltage)), "voltage_V": voltage, "angular_velocity_rad_s": speed})
     records = campaign(tmp_path, DISC, files)
     found = close_loop(records.model(), records, {n: EFFECTS[n] for n in ("quadratic_drag", "output_delay", "cogging")})
@@ -181,10 +173,6 @@ damping = { low = 0.0, high = 10.0 }
 """
 
 
-def sticking(x, u):
-    return np.array([x[1], u - 1.5 * x[1] - 6.0 * np.tanh(x[1] / 0.02) - 130.0 * np.sin(x[0])])
-
-
 def test_sticks_of_a_coarse_encoder_tell_of_dry_friction(tmp_path):
     rng, interval, n, step = np.random.default_rng(7), 0.01, 2000, 2.0 * np.pi / 4096
     tables = {}
@@ -192,7 +180,8 @@ def test_sticks_of_a_coarse_encoder_tell_of_dry_friction(tmp_path):
         phases = rng.uniform(0.0, 2.0 * np.pi, 3)
         times = interval * np.arange(n)
         drive = sum(size * np.sin(w * times + p) for size, w, p in zip((30, 20, 15), (1.1, 2.7, 4.9), phases))
-        angle = moved(sticking, drive, interval, (0.0, 0.0), "zero", 4)[:, 0]
+        angle = moved(lambda x, u: np.array([x[1], u - 1.5 * x[1] - 6.0 * np.tanh(x[1] / 0.02) - 130.0 * np.sin(x[0])]),
+                      drive, interval, (0.0, 0.0), "zero", 4)[:, 0]  # fmt: skip
         # a clock that is a little uneven
         uneven = times + 0.02 * interval * rng.uniform(-1.0, 1.0, n)
         tables[file] = {"time_s": uneven, "drive_N_m": drive, "angle_rad": np.round(angle / step) * step}

@@ -123,7 +123,7 @@ def test_what_held_out_records_deny_does_not_carry_over_and_is_no_draw():
     assert verdicts_of(found, (), MISSED, (step("viscous", False),), None) == ("does_not_carry_over",)
 
 
-def test_what_may_stand_in_the_place_of_an_effect():
+def test_what_may_stand_in_the_place_of_an_effect_and_how_hypotheses_are_spelled():
     found = Inference(None, posterior(
         ("viscous coulomb", 0.4), ("viscous seal", 0.2), ("viscous stribeck", 0.15), ("viscous stribeck unknown:torque",
         0.1), ("viscous record:late@a.csv", 0.05), ("viscous", 0.04), ("viscous seal tilt", 0.03), ("seal", 0.02),
@@ -135,9 +135,6 @@ def test_what_may_stand_in_the_place_of_an_effect():
     assert partners == pytest.approx({"stribeck": 0.25, "seal": 0.2})
     assert list(partners) == ["stribeck", "seal"], "the most probable first"
     assert found.partners(model, effect("viscous")) == {}
-
-
-def test_models_of_the_table_are_told_apart_by_forms_and_variables():
     over = [Hypothesis("unknown", "torque", variable) for variable in ("v", "time (0.2 of a record)")]
     assert [spelled(h) for h in (*over, replace(effect("drag"), form="tanh"), effect("drag"), LATE)] == [
         "something at torque, over v", "something at torque, over time (0.2 of a record)", "drag:tanh", "drag",
@@ -188,7 +185,7 @@ def test_a_name_is_claimed_that_is_probable_and_whose_fit_is_settled(p, at_a_lim
     assert steps_of(inference, [frozenset(), frozenset({LATE})], [None, after]) == ()
 
 
-def test_a_limit_that_holds_a_parameter_is_told():
+def test_a_limit_that_holds_a_parameter_is_told_and_an_interval_is_drawn_as_it_is():
     at_limit = Estimate("n", 1.5, "1", 1.4, 1.6, (HELD,))
     other = Estimate("p0", 3e6, "Pa", 2.9e6, 3.1e6, ())
     length = Estimate("x.width", 0.02, "m", 0.01, 0.03, ("something else", HELD))
@@ -196,6 +193,9 @@ def test_a_limit_that_holds_a_parameter_is_told():
     said = limits_of(SimpleNamespace(estimates=(at_limit, other, length, at_zero)))
     assert [s.partition(":")[0] for s in said] == ["n sits at its limit 1.5", "x.width sits at its limit 0.02 m"]
     assert said[0].endswith("widen it (--bounds n=LOW:HIGH), or fix it.")
+    assert ends_of({"value": 3.0, "low": 1.0, "high": 3.5}, 2.0) == [[4.0], [1.0]]
+    assert ends_of({"value": 4.0, "low": 1.0, "high": 3.5}, 1.0) == [[3.0], [0.0]]
+    assert ends_of({"value": 4.0, "low": None, "high": None}, 1.0) == [[0.0], [0.0]]
 
 
 @pytest.mark.parametrize(("known", "where"), [([False], ""), ([True, False, True], " of 1 of 3 signals")])
@@ -205,12 +205,6 @@ def test_noise_that_no_rest_tells_is_told_of_the_records_that_lack_one(known, wh
     seen = {"data": SimpleNamespace(known=False, levels=levels), "residual": np.ones(4), "stages": {}, "phases": {}}
     said = diagnosis_sentences(SimpleNamespace(diagnosis=diagnosis, **seen))
     assert said[1] == f"No rest tells the noise{where}: the residual is tested against itself."
-
-
-def test_an_interval_is_drawn_as_it_is_and_not_about_its_value():
-    assert ends_of({"value": 3.0, "low": 1.0, "high": 3.5}, 2.0) == [[4.0], [1.0]]
-    assert ends_of({"value": 4.0, "low": 1.0, "high": 3.5}, 1.0) == [[3.0], [0.0]]
-    assert ends_of({"value": 4.0, "low": None, "high": None}, 1.0) == [[0.0], [0.0]]
 
 
 def test_the_parts_of_a_diagnosis_are_bars_from_noise_the_largest_first() -> None:

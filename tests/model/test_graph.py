@@ -24,13 +24,17 @@ def zero():
     return 0.0
 
 
-def test_own_names_come_before_the_plants() -> None:
+def test_own_names_come_before_the_plants_and_an_argument_may_be_bound_to_another_name() -> None:
     own = Effect("own", (Parameter("omega", "1", 0, 1), Parameter("R", "1", 0, 1)), {"torque": lambda omega, R, K: K},
                  (State("current", "A", lambda current: current, zero),))  # fmt: skip
     model = Model(ARM) + own
     assert bound(model, "own__torque") == {"omega": "own__omega", "R": "own__R", "K": "K"}
     assert bound(model, "rate__own__current") == {"current": "own__current"}
     assert bound(model, "rate__theta") == {"omega": "omega"}
+    follower = Effect("e", LEVEL, {"torque": lambda x, level: level * x}, binds={"x": "current"})
+    assert bound(Model(ARM) + follower, "e__torque") == {"x": "current", "level": "e__level"}
+    with pytest.raises(ArmidError, match="effect 'e' binds 'x' to 'curent', which nobody offers here: did you mean"):
+        Model(ARM) + replace(follower, binds={"x": "curent"})
 
 
 BOUND = {
@@ -49,20 +53,7 @@ def test_what_can_be_asked_for(case: str) -> None:
     assert bound(Model(plant) + Effect("e", LEVEL, {port: function}), f"e__{port}") == expected
 
 
-def test_an_argument_may_be_bound_to_another_name() -> None:
-    follower = Effect("e", LEVEL, {"torque": lambda x, level: level * x}, binds={"x": "current"})
-    assert bound(Model(ARM) + follower, "e__torque") == {"x": "current", "level": "e__level"}
-    with pytest.raises(ArmidError, match="effect 'e' binds 'x' to 'curent', which nobody offers here: did you mean"):
-        Model(ARM) + replace(follower, binds={"x": "curent"})
-
-
-def test_an_initial_value_takes_the_start_of_other_states() -> None:
-    lag = State("lag", "rad/s", lambda lag, omega: omega - lag, lambda omega, theta_C: omega + theta_C)
-    model = Model(ARM) + Effect("e", LEVEL, {"feedback": lambda lag, level: level * lag}, (lag,))
-    assert bound(model, "initial__e__lag") == {"omega": "initial__omega", "theta_C": "theta_C"}
-
-
-def test_an_initial_value_takes_what_moves_at_the_start() -> None:
+def test_an_initial_value_takes_what_moves_at_the_start_and_that_of_other_states() -> None:
     """Through ports, effects and switches; a quantity that does not move stands for itself."""
     lag = State("lag", "V", lambda lag, omega: omega - lag, lambda voltage, gravity_level: voltage + gravity_level)
     model = Model(ARM) + Effect("e", LEVEL, {"torque": lambda lag, level: level * lag}, (lag,))
@@ -75,38 +66,33 @@ def test_an_initial_value_takes_what_moves_at_the_start() -> None:
     # K_p (theta_D - theta_C) less the threshold: this short stroke begins in closed loop
     level = gravity_level(gravity_moment(72.5, 118.0, 0.4106, 0.58, 1.0, 9.81), math.radians(5.0), 0.0)
     assert start[-1] == pytest.approx(280.0 * 0.1 - 0.5 + level)
+    lag = State("lag", "rad/s", lambda lag, omega: omega - lag, lambda omega, theta_C: omega + theta_C)
+    model = Model(ARM) + Effect("e", LEVEL, {"feedback": lambda lag, level: level * lag}, (lag,))
+    assert bound(model, "initial__e__lag") == {"omega": "initial__omega", "theta_C": "theta_C"}
 
 
-def test_ports_sum_what_effects_add() -> None:
+def test_ports_sum_what_effects_add_and_the_graph_knows_what_depends_on_the_motion() -> None:
     one, two = (Effect(n, LEVEL, {"torque": lambda level: level}) for n in ("one", "two"))
     graph = (Model(ARM) + one + two).graph
     assert graph.nodes["torque"].terms == ("one__torque", "two__torque")
     assert graph.nodes["drive"].terms == ()
-
-
-def test_what_depends_on_parameters_alone_is_static() -> None:
     graph = (Model(ARM) + Effect("e", LEVEL, {"gravity": lambda level: level})).graph
     static = [graph.is_static(k) for k in ("gravity_level", "e__gravity", "initial__pressure", "gravity_torque")]
     assert static == [True, True, True, False]
-
-
-def test_what_follows_the_motion_depends_on_it_through_rates_too() -> None:
-    """A motor current does, by the back-EMF; the state of an actuator that takes an input alone does not."""
+    # A motor current does, by the back-EMF; the state of an actuator that takes an input alone does not.
     fed = with_state(lambda x, U: U - x, lambda: 0.0)
     graph = (Model(ARM) + fed).graph
     assert [graph.depends_on(k, ("omega", "theta")) for k in ("e__x", "current", "omega")] == [False, True, True]
 
-
-def with_state(rate: Callable[..., float], start: Callable[..., float]) -> Effect:
-    return Effect("e", LEVEL, {"torque": lambda x: x}, (State("x", "1", rate, start),))
-
-
-def test_a_comment_may_stand_at_the_margin() -> None:
     def torque(omega, level):
         # it is not part of the indentation
         return -level * omega
 
     assert "e__torque" in (Model(ARM) + Effect("e", LEVEL, {"torque": torque})).graph.nodes
+
+
+def with_state(rate: Callable[..., float], start: Callable[..., float]) -> Effect:
+    return Effect("e", LEVEL, {"torque": lambda x: x}, (State("x", "1", rate, start),))
 
 
 REFUSED = {

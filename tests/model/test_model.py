@@ -15,7 +15,7 @@ COULOMB, VISCOUS = EFFECTS["coulomb"], EFFECTS["viscous"]
 LEVEL = (Parameter("level", "effort", 0.0, 1.0, null=0.0),)
 
 
-def test_plus_adds_in_order_and_leaves_the_model_alone() -> None:
+def test_plus_adds_in_order_and_minus_takes_away_and_the_model_is_left_alone() -> None:
     bare = Model(ARM)
     model = bare + VISCOUS + COULOMB
     assert [e.name for e in model.effects] == ["viscous", "coulomb"]
@@ -23,9 +23,6 @@ def test_plus_adds_in_order_and_leaves_the_model_alone() -> None:
     assert list(model.parameters) == ["p0", "k", "eta3", "n", "viscous.slope", "coulomb.level", "coulomb.width"]
     with pytest.raises(ArmidError, match="effect 'coulomb' is in the model already: each effect at most once is"):
         model + COULOMB
-
-
-def test_minus_takes_away_by_name_or_effect() -> None:
     model = Model(ARM) + COULOMB + VISCOUS
     assert [e.name for e in (model - "coulomb").effects] == ["viscous"]
     assert [e.name for e in (model - VISCOUS).effects] == ["coulomb"]
@@ -101,7 +98,7 @@ ROTARY = Scales(effort=1000.0, speed=2.0)
 AXIS = Scales(effort=150.0, speed=0.3, effort_unit="N", length_unit="m")
 
 
-def test_names() -> None:
+def test_names_and_units_that_stay_and_those_that_are_refused() -> None:
     for name in ("p0", "eta3", "h", "np", "abs", "I6_loaded", "match"):
         check_name(name, "parameter")
     for name in ("a b", "2a", "lambda", "a__b", "_a", "a_", "", "a.b"):
@@ -109,12 +106,14 @@ def test_names() -> None:
             Parameter(name, "1", 0.0, 1.0)
     with pytest.raises(ArmidError, match="state 'time' cannot have this name: in the equations, time is"):
         check_name("time", "state")
-
-
-@pytest.mark.parametrize(("low", "high"), [(1.0, 1.0), (2.0, 1.0), (float("nan"), 1.0), (0.0, float("nan"))])
-def test_bounds_that_are_no_interval_are_refused(low: float, high: float) -> None:
-    with pytest.raises(ArmidError, match=r"parameter 'a' has low .* and high .*: low < high is expected"):
-        Parameter("a", "1", low, high)
+    for low, high in ((1.0, 1.0), (2.0, 1.0), (float("nan"), 1.0), (0.0, float("nan"))):
+        with pytest.raises(ArmidError, match=r"parameter 'a' has low .* and high .*: low < high is expected"):
+            Parameter("a", "1", low, high)
+    for unit in ("Pa", "1", "kg m2", "s", "N m s/rad"):
+        parameter = Parameter("c", unit, 1.0, 2.0)
+        assert resolve(parameter, ROTARY) is parameter
+    with pytest.raises(ArmidError, match=r"'sped'.*'speed'"):
+        resolve(Parameter("c", "effort/sped", 0.0, 1.0), ROTARY)
 
 
 @pytest.mark.parametrize(("unit", "scales", "si", "size"), [
@@ -127,11 +126,3 @@ def test_products_of_scales_become_si(unit: str, scales: Scales, si: str, size: 
     assert found.unit == si
     assert (found.low, found.high) == pytest.approx((-size, 2 * size))
     assert (found.null, found.fixed, found.nominal) == pytest.approx((0.0, 0.5 * size, 0.25 * size))
-
-
-def test_physical_units_stay_and_a_misspelt_scale_is_refused() -> None:
-    for unit in ("Pa", "1", "kg m2", "s", "N m s/rad"):
-        parameter = Parameter("c", unit, 1.0, 2.0)
-        assert resolve(parameter, ROTARY) is parameter
-    with pytest.raises(ArmidError, match=r"'sped'.*'speed'"):
-        resolve(Parameter("c", "effort/sped", 0.0, 1.0), ROTARY)

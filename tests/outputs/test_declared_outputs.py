@@ -20,7 +20,7 @@ START = np.array([0.1, 0.5, 0.05, 0.4])
 STARTS = dict(zip(("start_motor", "start_motor_speed", "start_load", "start_load_speed"), START, strict=True))
 
 
-def test_one_simulation_gives_all_outputs_as_scipy_does() -> None:
+def test_one_simulation_gives_all_outputs_as_scipy_does_and_loses_all_where_it_diverges() -> None:
     u = drive(400, 1.0)
     run = simulate(Model(two_inertias), Manoeuvre(INTERVAL, 400, STARTS, {"u": u}), list(TRUTH.values()), Schedule(8))
     expected = oracle(u, START)
@@ -30,10 +30,7 @@ def test_one_simulation_gives_all_outputs_as_scipy_does() -> None:
     alone = simulate(Model(two_inertias.recording({"load_angle"})), Manoeuvre(INTERVAL, 400, STARTS, {"u": u}),
                      list(TRUTH.values()), Schedule(8))  # fmt: skip
     np.testing.assert_array_equal(alone.output, run.outputs[1])
-
-
-def test_a_candidate_that_diverges_is_lost_in_all_outputs() -> None:
-    """The stiffness of a spring that pushes lets the angle run away first."""
+    # The stiffness of a spring that pushes lets the angle run away first.
     manoeuvre = Manoeuvre(INTERVAL, 900, STARTS, {"u": drive(900, 1.0)})
     run = simulate(Model(two_inertias), manoeuvre, [list(TRUTH.values()), [0.1, 0.08, -250.0, 0.12]], Schedule(4))
     assert run.failed.tolist() == [False, True]
@@ -41,7 +38,7 @@ def test_a_candidate_that_diverges_is_lost_in_all_outputs() -> None:
     assert np.isnan(run.outputs[:, 1, -1]).all()
 
 
-def test_the_old_way_declares_one_output() -> None:
+def test_the_old_way_declares_one_output_and_a_wrong_one_is_refused() -> None:
     for plant in PLANTS.values():
         for one in (plant, *plant.variants):
             if one.records_one_speed:
@@ -50,6 +47,10 @@ def test_the_old_way_declares_one_output() -> None:
     assert (two_inertias.output, two_inertias.output_unit) == ("recorded_speed", "rad/s")
     assert replace(two_inertias, note="x").outputs == two_inertias.outputs
     assert "recorded load_angle [rad]: recorded_load" in str(Model(two_inertias))
+    with pytest.raises(ArmidError, match="unit 'deg'"):
+        Output("angle", "q", "deg")
+    with pytest.raises(ArmidError, match="a name that ends in _deg or _rad"):
+        Output("angle", "q", "rad", ("angle",))
 
 
 @pytest.mark.parametrize(
@@ -64,13 +65,6 @@ def test_the_old_way_declares_one_output() -> None:
 def test_a_wrong_declaration_is_refused(changes, said) -> None:
     with pytest.raises(ArmidError, match=said):
         replace(two_inertias, **changes)
-
-
-def test_a_wrong_output_is_refused() -> None:
-    with pytest.raises(ArmidError, match="unit 'deg'"):
-        Output("angle", "q", "deg")
-    with pytest.raises(ArmidError, match="a name that ends in _deg or _rad"):
-        Output("angle", "q", "rad", ("angle",))
 
 
 @pytest.mark.slow
@@ -115,7 +109,7 @@ def test_a_record_brings_any_outputs_in_the_unit_of_its_header(tmp_path) -> None
     assert angle.noise.rms == pytest.approx(NOISE_ANGLE, rel=0.15)
 
 
-def test_every_state_of_the_start_comes_from_the_outputs(tmp_path) -> None:
+def test_every_state_of_the_start_comes_from_the_outputs_unless_it_is_given(tmp_path) -> None:
     """A record in motion: what nothing shows keeps its default and the plant's size; errors are within deviations."""
     campaign = read_campaign(write_drive(tmp_path / "drive"), {"two_inertias": two_inertias})
     _, train, held = campaign.records
@@ -130,11 +124,8 @@ def test_every_state_of_the_start_comes_from_the_outputs(tmp_path) -> None:
     # of the record held out the first 5 % tell the start and judge nothing
     assert (held.pieces[0].n_spent, held.pieces[0].window) == (35, slice(35, 700))
     assert not held.pieces[0].shown_start
-
-
-def test_a_start_that_is_given_is_taken(tmp_path) -> None:
     given = "".join(f"constants.{name} = 0.0\n" for name in STARTS)
-    campaign = read_campaign(write_drive(tmp_path / "drive", more=given), {"two_inertias": two_inertias})
+    campaign = read_campaign(write_drive(tmp_path / "given", more=given), {"two_inertias": two_inertias})
     piece = campaign.holdout[0].pieces[0]
     assert (piece.window, piece.shown_start, piece.start_deviation) == (slice(0, 700), {}, {})
     with pytest.raises(ArmidError, match="restart_s and the constant start_load are both given"):

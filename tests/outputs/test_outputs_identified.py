@@ -60,12 +60,6 @@ def test_the_start_is_fitted_and_leaves_noise(ready) -> None:
     )
 
 
-def test_what_two_signals_of_one_unit_may_have_been_mistaken_for(campaign) -> None:
-    told = {c.kind: c.words for c in corrections(campaign.plant, campaign.train[0], 10)}
-    assert "load_angle and deflection look exchanged" in told["exchanged"]
-    assert "deflection looks counted from the ground" in told["absolute"]
-
-
 def test_samples_that_are_no_data_tell_nothing_of_the_start(tmp_path) -> None:
     folder = write_drive(tmp_path / "c")
     columns = dict(read_table(folder / "b.csv", "b.csv").columns)
@@ -118,9 +112,12 @@ def test_a_fitness_names_an_output(ready) -> None:
         fitness_of_name("rms:load_angle", FITNESS)
 
 
-def test_an_examination_holds_the_truth(campaign) -> None:
+def test_an_examination_holds_the_truth_and_what_two_signals_of_one_unit_may_be_mistaken_for(campaign) -> None:
     model = Model(campaign.plant)
     found = examine(campaign, model, space_of(model))
     inside = [p.low <= TRUTH[p.name] <= p.high for p in found.profiles]
     assert sum(inside) >= 3
     assert found.offers[0].gain > 1.0
+    told = {c.kind: c.words for c in corrections(campaign.plant, campaign.train[0], 10)}
+    assert "load_angle and deflection look exchanged" in told["exchanged"]
+    assert "deflection looks counted from the ground" in told["absolute"]

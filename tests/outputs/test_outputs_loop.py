@@ -29,7 +29,7 @@ def closed(tmp_path_factory):
     return close_loop(campaign.model(), campaign, {**wanted, **sensor_effects(campaign.plant)})
 
 
-def test_the_missing_friction_is_named_and_the_rest_is_noise(closed) -> None:
+def test_the_missing_friction_is_named_the_rest_is_noise_and_the_start_held_out_does_not_judge(closed) -> None:
     """The bias of the load's angle is none: a start that is fitted makes up for all of it."""
     assert (closed.verdict, closed.effects) == ("explained", ("coulomb",))
     found = {e.name: e for e in closed.after.estimates}
@@ -39,9 +39,14 @@ def test_the_missing_friction_is_named_and_the_rest_is_noise(closed) -> None:
     for replay, residual, noise in zip(closed.after.train.replays, closed.after.train.raw,
                                        (NOISE_SPEED, NOISE_ANGLE, NOISE_ANGLE, NOISE_ANGLE), strict=True):  # fmt: skip
         assert np.sqrt(np.mean(residual**2)) == pytest.approx(noise, rel=0.1), replay.name
+    piece = closed.campaign.holdout[0].pieces[0]
+    assert (piece.n_spent, piece.window.start) == (35, 35)
+    assert closed.after.holdout.replays[0].pieces[0].manoeuvre.constants == piece.manoeuvre.constants
+    again = holdout_residuals(closed.after.fit, closed.campaign.holdout, closed.inference.exploration.library)
+    np.testing.assert_array_equal(again.residual, closed.after.holdout.residual)
 
 
-def test_the_report_tells_each_output(closed) -> None:
+def test_the_report_tells_each_output_and_its_residual_is_drawn_against_speed_and_position(closed) -> None:
     report, details = report_of(closed), details_of(closed)
     assert list(report["outputs"]) == ["motor_speed", "load_angle", "deflection"]
     assert (report["unit"], report["outputs"]["deflection"]["unit"]) == ("rad/s", "rad")
@@ -56,12 +61,8 @@ def test_the_report_tells_each_output(closed) -> None:
     document = loop_document(report, details, {}, "again")
     assert "load_angle" in " ".join(document.answer)
     assert any("in load_angle" in f.where for f in closed.before.diagnosis.findings)
-    for draw in figures_of(closed, report, details).values():
-        pyplot().close(draw())
-
-
-def test_the_residual_of_each_output_is_drawn_against_speed_and_position(closed) -> None:
-    figure = figures_of(closed, report_of(closed), details_of(closed))["against"]()
+    drawn = {name: draw() for name, draw in figures_of(closed, report, details).items()}
+    figure = drawn["against"]
     variables = closed.before.train.variables
     assert len(figure.axes) % 2 == 0
     for axis in figure.axes:
@@ -69,15 +70,7 @@ def test_the_residual_of_each_output_is_drawn_against_speed_and_position(closed)
         assert 0 < len(samples) <= len(variables[axis.get_xlabel().partition(" [")[0]])
         before, after = (np.abs(means[name].get_ydata()).max() for name in ("before", "after"))
         assert after < before
-    pyplot().close(figure)
-
-
-def test_the_start_of_a_record_held_out_does_not_judge(closed) -> None:
-    piece = closed.campaign.holdout[0].pieces[0]
-    assert (piece.n_spent, piece.window.start) == (35, 35)
-    assert closed.after.holdout.replays[0].pieces[0].manoeuvre.constants == piece.manoeuvre.constants
-    again = holdout_residuals(closed.after.fit, closed.campaign.holdout, closed.inference.exploration.library)
-    np.testing.assert_array_equal(again.residual, closed.after.holdout.residual)
+    pyplot().close("all")
 
 
 @pytest.fixture

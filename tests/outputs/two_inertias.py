@@ -1,6 +1,7 @@
 """A drive of two inertias with four outputs, and records of it that scipy makes: no line of the engine is in them."""
 
 from collections.abc import Mapping
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,54 +15,6 @@ from armid.record import write_campaign
 Array = NDArray[np.float64]
 
 
-def shaft(stiffness, damping, q, p, v, w):
-    return stiffness * (q - p) + damping * (v - w)
-
-
-def motor_angle_rate(v):
-    return v
-
-
-def motor_speed_rate(u, shaft, torque, motor):
-    return (u - shaft + torque) / motor
-
-
-def load_angle_rate(w):
-    return w
-
-
-def load_speed_rate(shaft, load):
-    return shaft / load
-
-
-def first_motor_angle(start_motor):
-    return start_motor
-
-
-def first_motor_speed(start_motor_speed):
-    return start_motor_speed
-
-
-def first_load_angle(start_load):
-    return start_load
-
-
-def first_load_speed(start_load_speed):
-    return start_load_speed
-
-
-def recorded_speed(v, output):
-    return v + output
-
-
-def recorded_load(p, load_sensor):
-    return p + load_sensor
-
-
-def deflection(p, q):
-    return p - q
-
-
 two_inertias = Plant(
     name="two_inertias",
     note="a motor drives a load through an elastic shaft",
@@ -70,13 +23,15 @@ two_inertias = Plant(
         Parameter("stiffness", "N m/rad", 5.0, 80.0), Parameter("damping", "N m s/rad", 0.0, 1.0),
     ),
     states=(
-        State("q", "rad", motor_angle_rate, first_motor_angle),
-        State("v", "rad/s", motor_speed_rate, first_motor_speed),
-        State("p", "rad", load_angle_rate, first_load_angle),
-        State("w", "rad/s", load_speed_rate, first_load_speed),
+        State("q", "rad", lambda v: v, lambda start_motor: start_motor),
+        State("v", "rad/s", lambda u, shaft, torque, motor: (u - shaft + torque) / motor,
+              lambda start_motor_speed: start_motor_speed),
+        State("p", "rad", lambda w: w, lambda start_load: start_load),
+        State("w", "rad/s", lambda shaft, load: shaft / load, lambda start_load_speed: start_load_speed),
     ),
-    quantities={"shaft": shaft, "recorded_speed": recorded_speed, "recorded_load": recorded_load,
-                "deflection": deflection},
+    quantities={"shaft": lambda stiffness, damping, q, p, v, w: stiffness * (q - p) + damping * (v - w),
+                "recorded_speed": lambda v, output: v + output, "deflection": lambda p, q: p - q,
+                "recorded_load": lambda p, load_sensor: p + load_sensor},
     constants=tuple(Constant(name, 0.0, unit) for name, unit in (
         ("start_motor", "rad"), ("start_motor_speed", "rad/s"), ("start_load", "rad"), ("start_load_speed", "rad/s"))),
     inputs=(Input("u", "N m", ("drive_N_m",)),),
@@ -98,6 +53,12 @@ INTERVAL, NOISE_SPEED, NOISE_ANGLE = 0.004, 0.02, 0.002
 def drive(n_samples: int, pace: float) -> Array:
     times = INTERVAL * np.arange(n_samples)
     return 1.2 * np.sin(2.0 * pace * times) + 0.8 * np.sin(5.3 * pace * times + 0.4)
+
+
+@cache
+def motion(n_samples: int, pace: float, start: tuple[float, ...], friction: float) -> dict[str, Array]:
+    """Return the motion of a record; the integrator is slow, and many tests want the same ones."""
+    return oracle(drive(n_samples, pace), np.array(start), friction)
 
 
 def oracle(u: Array, start: Array, friction: float = 0.0, truth: Mapping[str, float] = TRUTH) -> dict[str, Array]:
@@ -125,13 +86,13 @@ def made_columns(
 ) -> dict[str, Array]:
     """Return the columns of a noisy record; bias: of the load's angle [rad]."""
     u, rng = drive(n_samples, pace), np.random.default_rng(seed)
-    motion = oracle(u, start, friction)
-    angle = motion["p"] + bias + rng.normal(0.0, NOISE_ANGLE, n_samples)
+    moved = motion(n_samples, pace, tuple(start), friction)
+    angle = moved["p"] + bias + rng.normal(0.0, NOISE_ANGLE, n_samples)
     return {
         "time_s": INTERVAL * np.arange(n_samples), "drive_N_m": u,
-        "motor_speed_rad_s": motion["v"] + rng.normal(0.0, NOISE_SPEED, n_samples),
+        "motor_speed_rad_s": moved["v"] + rng.normal(0.0, NOISE_SPEED, n_samples),
         "load_angle_deg": np.rad2deg(angle),
-        "deflection_deg": np.rad2deg(motion["p"] - motion["q"] + rng.normal(0.0, NOISE_ANGLE, n_samples)),
+        "deflection_deg": np.rad2deg(moved["p"] - moved["q"] + rng.normal(0.0, NOISE_ANGLE, n_samples)),
     }  # fmt: skip
 
 

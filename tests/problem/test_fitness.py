@@ -29,7 +29,8 @@ def records() -> list[tuple[Array, Array]]:
     return [(x, x + 0.1 * np.abs(x).max() * rng.standard_normal((5, x.size))) for x in series]
 
 
-def test_a_plain_function_becomes_a_fitness() -> None:
+def test_a_plain_function_becomes_a_fitness_and_what_it_returns_is_checked() -> None:
+    x, rows = records()[0]
     x, rows = records()[0]
     mine = as_fitness("mine", lambda measured, simulated: np.abs(simulated - measured).max(axis=1))
     assert (mine.name, mine.join, mine.finish) == ("mine", "duration", None)
@@ -37,6 +38,12 @@ def test_a_plain_function_becomes_a_fitness() -> None:
     assert as_fitness("other", mine) is mine
     compiled = as_fitness("compiled", njit(lambda measured, simulated: simulated[:, 0] - measured[0] + 1.0))
     np.testing.assert_array_equal(compiled(x, rows), rows[:, 0] - x[0] + 1.0)
+    rows = np.vstack([rows, np.full((1, x.size), np.nan)])
+    values = as_fitness("mine", lambda measured, simulated: [1.0, np.nan, np.inf, -np.inf, 2, 3])(x, rows)
+    np.testing.assert_array_equal(values, [1.0, np.inf, np.inf, np.inf, 2.0, np.inf])
+    for bad in (np.zeros(5), np.zeros((6, 1)), 1.0, "a", None, [1.0, "b"]):
+        with pytest.raises(ValueError, match=r"fitness 'mine' returned .*, expected"):
+            as_fitness("mine", lambda measured, simulated, bad=bad: bad)(x, rows)
 
 
 def test_arguments_bind_by_name_and_order_does_not_matter() -> None:
@@ -49,16 +56,6 @@ def test_arguments_bind_by_name_and_order_does_not_matter() -> None:
     np.testing.assert_allclose(fitness(x, rows, **OF_RECORD), 0.001 * 0.2 * 2.0 * 401)
     with pytest.raises(ValueError, match="'mine' asks for the noise of the record"):
         fitness(x, rows, interval=0.001)
-
-
-def test_what_a_function_returns_is_checked() -> None:
-    x, rows = records()[0]
-    rows = np.vstack([rows, np.full((1, x.size), np.nan)])
-    values = as_fitness("mine", lambda measured, simulated: [1.0, np.nan, np.inf, -np.inf, 2, 3])(x, rows)
-    np.testing.assert_array_equal(values, [1.0, np.inf, np.inf, np.inf, 2.0, np.inf])
-    for bad in (np.zeros(5), np.zeros((6, 1)), 1.0, "a", None, [1.0, "b"]):
-        with pytest.raises(ValueError, match=r"fitness 'mine' returned .*, expected"):
-            as_fitness("mine", lambda measured, simulated, bad=bad: bad)(x, rows)
 
 
 @pytest.mark.parametrize(("function", "sentence"), [
@@ -78,22 +75,21 @@ def test_refuses_a_function_that_a_record_cannot_feed(function: Any, sentence: s
     assert sentence in str(refusal.value)
 
 
-def test_refuses_an_unknown_join() -> None:
-    with pytest.raises(ValueError, match="joins records by 'durations', did you mean 'duration'"):
-        Fitness("mine", lambda measured, simulated: 0, join="durations")
-
-
-@pytest.mark.parametrize("weights", [(1.0, 0.0), (1.0, np.nan)])
-def test_refuses_weights_that_do_not_fit(weights: tuple[float, ...]) -> None:
-    with pytest.raises(ValueError, match="weighs records"):
-        record_weights(FITNESS["rmse"], (1.0, 1.0), weights)
-
-
-def test_likelihood_needs_noise() -> None:
+def test_refuses_noise_that_is_none_a_measurement_of_zero_and_an_unknown_join() -> None:
     x, rows = records()[0]
     for noise in (None, 0.0):
         with pytest.raises(ValueError, match="noise"):
             FITNESS["likelihood"](x, rows, noise=noise)
+    for noise in (0.0, -1.0, np.nan, np.inf):
+        with pytest.raises(ValueError, match="expected an rms above 0"):
+            chi_square(*records()[0], noise)
+    with pytest.raises(ValueError, match="zero throughout"):
+        relative_mean_square(np.zeros(3), np.ones((1, 3)))
+    with pytest.raises(ValueError, match="joins records by 'durations', did you mean 'duration'"):
+        Fitness("mine", lambda measured, simulated: 0, join="durations")
+    for weights in ((1.0, 0.0), (1.0, np.nan)):
+        with pytest.raises(ValueError, match="weighs records"):
+            record_weights(FITNESS["rmse"], (1.0, 1.0), weights)
 
 
 def noisy() -> tuple[Array, Array]:
@@ -127,7 +123,7 @@ def test_a_spectrum_knows_amplitudes_and_no_phase() -> None:
     assert FITNESS["spectrum"](sine, none)[0] * 251 == pytest.approx(1.0 + 2.0 * 0.5**2, rel=0.02)
 
 
-def test_warped_time_forgives_what_is_late() -> None:
+def test_warped_time_forgives_what_is_late_and_names_the_package_that_it_needs(monkeypatch) -> None:
     x, rows = noisy()
     values = np.sqrt(FITNESS["dtw"](x, rows, interval=0.001))
     squares = np.sqrt(FITNESS["rmse"](x, rows))
@@ -136,17 +132,6 @@ def test_warped_time_forgives_what_is_late() -> None:
     # nothing may be moved: what is left is the rmse
     alone = Fitness("stiff", partial(FITNESS["dtw"].function, reach=0.0))
     np.testing.assert_allclose(alone(x, rows, interval=0.001), squares**2)
-
-
-def test_warped_time_names_the_package_that_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "dtaidistance.dtw", None)
     with pytest.raises(ValueError, match="needs the package dtaidistance, which is not installed"):
         FITNESS["dtw"](*noisy(), interval=0.001)
-
-
-def test_refuses_noise_that_is_none_and_a_zero_measurement_to_divide_by() -> None:
-    for noise in (0.0, -1.0, np.nan, np.inf):
-        with pytest.raises(ValueError, match="expected an rms above 0"):
-            chi_square(*records()[0], noise)
-    with pytest.raises(ValueError, match="zero throughout"):
-        relative_mean_square(np.zeros(3), np.ones((1, 3)))

@@ -14,7 +14,7 @@ def simulate(meter: Meter, fitness: list[float], failed: list[bool] | None = Non
     meter.record([[i, f] for i, f in enumerate(fitness)], fitness, failed)
 
 
-def test_grants_exactly_the_budget() -> None:
+def test_grants_exactly_the_budget_and_the_log_holds_everything_in_order() -> None:
     meter = Meter(10)
     assert [meter.grant(n) for n in (3, 3, 20, 0, -1)] == [3, 3, 10, 0, 0]
     for asked, granted in ((4, 4), (4, 4), (4, 2), (4, 0)):
@@ -23,33 +23,6 @@ def test_grants_exactly_the_budget() -> None:
     assert (meter.used, meter.left, meter.exhausted) == (10, 0, True)
     with pytest.raises(ValueError, match="1 simulations were made, the budget allowed 0"):
         simulate(meter, [1.0])
-
-
-def test_keeps_the_best_and_each_improvement() -> None:
-    meter = Meter(100)
-    assert (meter.best_x, meter.best_f) == (None, np.inf)
-    simulate(meter, [5.0, 7.0, 5.0, 3.0])
-    simulate(meter, [4.0, 3.0])
-    simulate(meter, [9.0, 2.0, 1.0])
-    evaluation, value = meter.trace()
-    assert evaluation.tolist() == [1, 4, 8, 9]
-    assert value.tolist() == [5.0, 3.0, 2.0, 1.0]
-    assert meter.best_f == 1.0
-    assert meter.best_x is not None
-    assert meter.best_x.tolist() == [2.0, 1.0]
-
-
-def test_neither_nan_nor_a_failed_candidate_is_the_best() -> None:
-    meter = Meter(100, target=0.5)
-    simulate(meter, [np.nan, np.inf, 0.1], [False, False, True])
-    assert (meter.best_x, meter.best_f, meter.reached, meter.n_failed) == (None, np.inf, False, 1)
-    assert [len(a) for a in meter.trace()] == [0, 0]
-    simulate(meter, [np.nan, 0.5, 0.2, np.nan], [True, False, True, False])
-    assert (meter.best_f, meter.reached, meter.n_failed, meter.used) == (0.5, True, 3, 7)
-    assert meter.trace().evaluation.tolist() == [5]
-
-
-def test_the_log_holds_everything_in_order() -> None:
     rng = np.random.default_rng(1)
     x, f, failed = rng.random((5000, 3)), rng.random(5000), rng.random(5000) < 0.1
     meter, start = Meter(5000), 0
@@ -64,6 +37,27 @@ def test_the_log_holds_everything_in_order() -> None:
     assert meter.best_f == f[~failed].min()
     with pytest.raises(ValueError, match="read-only"):
         log.F[0] = 0.0
+
+
+def test_keeps_each_improvement_and_the_best_which_is_neither_nan_nor_failed() -> None:
+    meter = Meter(100)
+    assert (meter.best_x, meter.best_f) == (None, np.inf)
+    simulate(meter, [5.0, 7.0, 5.0, 3.0])
+    simulate(meter, [4.0, 3.0])
+    simulate(meter, [9.0, 2.0, 1.0])
+    evaluation, value = meter.trace()
+    assert evaluation.tolist() == [1, 4, 8, 9]
+    assert value.tolist() == [5.0, 3.0, 2.0, 1.0]
+    assert meter.best_f == 1.0
+    assert meter.best_x is not None
+    assert meter.best_x.tolist() == [2.0, 1.0]
+    meter = Meter(100, target=0.5)
+    simulate(meter, [np.nan, np.inf, 0.1], [False, False, True])
+    assert (meter.best_x, meter.best_f, meter.reached, meter.n_failed) == (None, np.inf, False, 1)
+    assert [len(a) for a in meter.trace()] == [0, 0]
+    simulate(meter, [np.nan, 0.5, 0.2, np.nan], [True, False, True, False])
+    assert (meter.best_f, meter.reached, meter.n_failed, meter.used) == (0.5, True, 3, 7)
+    assert meter.trace().evaluation.tolist() == [5]
 
 
 def test_refuses_what_does_not_match() -> None:
@@ -83,7 +77,7 @@ def test_refuses_what_does_not_match() -> None:
         meter.record([[1.0, 2.0, 3.0]], [1.0])
 
 
-def test_the_termination_follows_the_meter() -> None:
+def test_the_termination_follows_the_meter_its_target_and_its_generations_and_a_copy_does() -> None:
     meter = Meter(4, target=0.0)
     termination = MeterTermination(meter)
     for used in range(4):
@@ -92,9 +86,6 @@ def test_the_termination_follows_the_meter() -> None:
         simulate(meter, [1.0])
     termination.update(SimpleNamespace(n_gen=1))
     assert termination.has_terminated()
-
-
-def test_the_termination_ends_at_the_target_and_at_its_generations() -> None:
     meter = Meter(1000, target=0.5)
     termination = MeterTermination(meter, n_max_gen=4)
     assert [termination.update(SimpleNamespace(n_gen=n)) for n in (1, 3, 4)] == [0.25, 0.75, 1.0]
@@ -102,9 +93,6 @@ def test_the_termination_ends_at_the_target_and_at_its_generations() -> None:
     assert termination.update(SimpleNamespace(n_gen=1)) == 1.0
     with pytest.raises(ValueError, match="n_max_gen is 0"):
         MeterTermination(meter, 0)
-
-
-def test_a_copied_termination_looks_at_the_same_meter() -> None:
     termination = MeterTermination(Meter(10), 7)
     termination.terminate()
     twin = copy.deepcopy(termination)

@@ -49,17 +49,17 @@ class Counted:
         return getattr(self.ready, name)
 
 
-@pytest.fixture
-def problem(arm_space, lowering_replays):
-    return IdentificationProblem(arm_space, lowering_replays, FITNESS["rmse"])
-
-
-def test_says_what_its_columns_are(arm_space, lowering_replays):
+def test_says_what_its_columns_are_and_wants_a_free_parameter_and_a_record(arm_space, lowering_replays):
     some = IdentificationProblem(arm_space.with_fixed("k", 1.0), lowering_replays, FITNESS["rmse"])
     assert (some.names, some.units) == (("p0", "eta3", "n"), ("Pa", "1", "1"))
     assert (some.n_var, some.n_obj, some.n_constr) == (3, 1, 0)
     np.testing.assert_array_equal(some.xl, [2.6e6, 0.45, 0.9])
     np.testing.assert_array_equal(some.xu, [3.5e6, 0.70, 1.5])
+    fixed = SimpleNamespace(free=np.array([False]))
+    with pytest.raises(ArmidError, match="no parameter is free"):
+        IdentificationProblem(fixed, lowering_replays, FITNESS["rmse"])
+    with pytest.raises(ArmidError, match="no record is given"):
+        IdentificationProblem(arm_space, (), FITNESS["rmse"])
 
 
 @pytest.mark.parametrize("name", ALGORITHMS)
@@ -124,7 +124,8 @@ def test_a_deep_copy_shares_records_and_meter(arm_space, lowering_replays):
     assert result.history[0].problem.replays is problem.replays
 
 
-def test_a_population_in_parts_gives_the_same_bits(problem, monkeypatch):
+def test_a_population_in_parts_gives_the_same_bits(arm_space, lowering_replays, monkeypatch):
+    problem = IdentificationProblem(arm_space, lowering_replays, FITNESS["rmse"])
     X = np.random.default_rng(3).uniform(problem.xl, problem.xu, (37, 4))
     whole = problem.value(X)
     seen = []
@@ -140,23 +141,7 @@ def test_a_population_in_parts_gives_the_same_bits(problem, monkeypatch):
     assert seen == [16, 16, 5]
 
 
-def test_without_a_free_parameter_or_a_record_it_is_refused(arm_space, lowering_replays):
-    fixed = SimpleNamespace(free=np.array([False]))
-    with pytest.raises(ArmidError, match="no parameter is free"):
-        IdentificationProblem(fixed, lowering_replays, FITNESS["rmse"])
-    with pytest.raises(ArmidError, match="no record is given"):
-        IdentificationProblem(arm_space, (), FITNESS["rmse"])
-
-
-def test_a_fixed_parameter_of_an_effect_stays_unless_bounds_free_it(arm):
-    model = arm + EFFECTS["coulomb"]
-    assert space_of(model).free_names == ("p0", "k", "eta3", "n", "coulomb.level")
-    freed = space_of(model, bounds={"coulomb.width": (0.001, 0.1)})
-    assert freed.free_names == ("p0", "k", "eta3", "n", "coulomb.level", "coulomb.width")
-    assert freed.units[-2:] == ("N m", "rad/s")
-
-
-def test_what_the_caller_says_wins_over_the_campaign_and_that_over_the_declaration(arm):
+def test_what_the_caller_says_wins_over_the_campaign_and_frees_what_an_effect_fixes(arm):
     overrides = {"p0": Override(low=2.8e6), "k": Override(fixed=0.9), "n": Override(fixed=1.2, low=1.0, high=1.3),
                  "coulomb.level": Override(fixed=3.0)}  # fmt: skip
     space = space_of(arm, overrides, bounds={"k": (0.5, 0.7)}, fixed={"eta3": 0.6})
@@ -164,17 +149,19 @@ def test_what_the_caller_says_wins_over_the_campaign_and_that_over_the_declarati
     np.testing.assert_array_equal(space.low[:2], [2.8e6, 0.5])
     np.testing.assert_array_equal(space.high[:2], [3.5e6, 0.7])
     np.testing.assert_array_equal(space.fixed, [np.nan, np.nan, 0.6, 1.2])
+    model = arm + EFFECTS["coulomb"]
+    assert space_of(model).free_names == ("p0", "k", "eta3", "n", "coulomb.level")
+    freed = space_of(model, bounds={"coulomb.width": (0.001, 0.1)})
+    assert freed.free_names == ("p0", "k", "eta3", "n", "coulomb.level", "coulomb.width")
+    assert freed.units[-2:] == ("N m", "rad/s")
 
 
-def test_bounds_and_fixed_values_by_name_leave_the_space_itself_alone(arm_space):
+def test_bounds_and_fixed_values_by_name_leave_the_space_itself_alone_and_complete_a_candidate(arm_space):
     changed = arm_space.with_bounds("n", 1.0, 1.2).with_fixed("p0", 3e6)
     assert changed.free_names == ("k", "eta3", "n")
     assert changed.with_bounds("p0", 2e6, 3e6).free_names == arm_space.names
     assert arm_space.high[3] == 1.5
     assert arm_space.free.all()
-
-
-def test_complete_puts_the_fixed_values_in(arm_space):
     space = arm_space.with_fixed("k", 1.0)
     whole = space.complete(np.array([[3e6, 0.5, 1.4], [2.7e6, 0.6, 1.1]]))
     np.testing.assert_array_equal(whole, [[3e6, 1.0, 0.5, 1.4], [2.7e6, 1.0, 0.6, 1.1]])
@@ -191,7 +178,7 @@ def test_signal_is_the_simulation_in_the_window(paper_arm, arm, arm_space):
     assert 0.0 < replay.engine_error_at(TRUTH) < 1e-5
 
 
-def test_pieces_stand_end_to_end(write_axis, axis_model, tmp_path):
+def test_pieces_stand_end_to_end_and_the_same_manoeuvre_is_calibrated_once(write_axis, axis_model, tmp_path):
     campaign = read_campaign(write_axis(tmp_path, more="restart_s = 0.5\n"))
     (replay,) = ready_record(campaign.records[0], axis_model, space_of(axis_model)).each
     assert len(replay.pieces) == 4
@@ -201,25 +188,19 @@ def test_pieces_stand_end_to_end(write_axis, axis_model, tmp_path):
     np.testing.assert_array_equal(replay.signal(candidates), np.hstack(parts))
     # a straight line through 20 ms is not quite the curved speed at a start
     np.testing.assert_allclose(replay.signal(candidates)[0], replay.measured, atol=3e-4)
-
-
-def test_the_same_manoeuvre_is_calibrated_once(write_axis, axis_model, tmp_path):
-    record = read_campaign(write_axis(tmp_path, more="restart_s = 0.5\n")).records[0]
-    doubled = replace(record, pieces=(record.pieces[1], record.pieces[1], record.pieces[2]))
+    _, second, third, _ = campaign.records[0].pieces
+    doubled = replace(campaign.records[0], pieces=(second, second, third))
     first, again, other = ready_record(doubled, axis_model, space_of(axis_model)).calibrations
     assert first is again
     assert other is not first
 
 
-def test_noise_decides_the_accuracy(paper_arm, arm, lowering):
+def test_noise_decides_the_accuracy_unless_one_is_given(paper_arm, arm, lowering, arm_space):
     record = lowering.train[0]
     quiet = with_noise(record, rms=1e-6)
     assert accuracy_against(record.noises, arm) == "standard"
     assert accuracy_against(quiet.noises, arm) == "fine"
     assert accuracy_against(with_noise(record, rms=0.0).noises, arm) == "fine"
-
-
-def test_a_given_accuracy_wins(lowering, arm, arm_space):
     (fine,) = ready_record(lowering.train[0], arm, arm_space, "fine").each
     assert fine.engine_error_at(TRUTH) < 2e-7
     with pytest.raises(ArmidError, match="'finest' is unknown: standard or fine"):

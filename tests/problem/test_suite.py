@@ -52,7 +52,7 @@ def test_every_problem_is_what_version_1_declares():
     assert hashlib.sha256("\n".join(lines).encode()).hexdigest()[:16] == "d012508c95671a16"
 
 
-def test_the_suite_is_a_lazy_sequence():
+def test_the_suite_is_a_lazy_sequence_and_what_is_hard_is_measured():
     suite = armid.suite()
     assert len(suite) == 15 * len(DEFINITIONS) >= 360
     assert [p.name for p in suite[:16]][-2:] == ["arm/15", "arm_noisy/1"]
@@ -63,6 +63,12 @@ def test_the_suite_is_a_lazy_sequence():
     for wrong in (lambda: suite["am/1"], lambda: armid.suite("two"), lambda: armid.suite(units="box ")):
         with pytest.raises(ArmidError, match=r"is not in the suite|known:|mean"):
             wrong()
+    arm, shape = armid.suite()["arm/1"], armid.suite()["arm_shape/1"]
+    assert arm.difficulty == "smooth"
+    assert arm.landscape["minima"] == 1.0
+    assert shape.difficulty == "stair"
+    assert shape.landscape["stair"] > 0.9
+    assert {measure for _, measure, _ in CLASSES_OF_FORMS} < set(arm.landscape)
 
 
 def test_making_the_suite_compiles_nothing(tmp_path):
@@ -74,14 +80,11 @@ def test_making_the_suite_compiles_nothing(tmp_path):
     assert (done.stdout, done.returncode) == ("4\n", 0), done.stderr
 
 
-def test_the_truth_is_the_optimum_where_there_is_no_noise():
+def test_the_truth_is_the_optimum_without_noise_which_sets_the_floor():
     for name in ("arm/2", "arm_similarity/2", "arm_shape/2"):
         problem = armid.suite()[name]
         assert problem(problem.truth) == problem.optimum_value == problem.floor == 0.0
         assert (problem.optimum_x == problem.truth).all()
-
-
-def test_noise_sets_the_floor():
     noisy = armid.suite()["arm_noisy/2"]
     assert noisy.floor == pytest.approx(np.deg2rad(0.3), rel=0.1)
     assert 0.98 * noisy.floor < noisy.optimum_value < noisy.floor
@@ -92,7 +95,7 @@ def test_noise_sets_the_floor():
     assert similar.floor > 0.0
 
 
-def test_a_call_takes_a_vector_or_an_array_in_either_unit():
+def test_a_call_takes_a_vector_or_an_array_in_either_unit_and_gives_one_objective_a_record():
     box, own = armid.suite()["arm/3"], armid.suite(units="SI")["arm/3"]
     u = np.random.default_rng(1).random((5, 4))
     values = box(u)
@@ -106,9 +109,6 @@ def test_a_call_takes_a_vector_or_an_array_in_either_unit():
     assert own.names[0] == "p0"
     assert own.xl[0] == 2.6e6
     assert box.cost_s > 0.0
-
-
-def test_one_objective_a_record():
     several = armid.suite("records")
     assert len(several) < len(armid.suite())
     problem, joined = several["arm_four/1"], armid.suite()["arm_four/1"]
@@ -118,15 +118,6 @@ def test_one_objective_a_record():
     assert problem(u[0]).shape == (4,)
     # records of the same length: the whole is the root of the mean square
     np.testing.assert_allclose(np.sqrt((problem(u) ** 2).mean(axis=1)), joined(u), rtol=1e-12)
-
-
-def test_what_is_hard_is_measured():
-    arm, shape = armid.suite()["arm/1"], armid.suite()["arm_shape/1"]
-    assert arm.difficulty == "smooth"
-    assert arm.landscape["minima"] == 1.0
-    assert shape.difficulty == "stair"
-    assert shape.landscape["stair"] > 0.9
-    assert {measure for _, measure, _ in CLASSES_OF_FORMS} < set(arm.landscape)
 
 
 def test_a_campaign_is_a_problem_on_top(paper_arm, paper_arm_folder):

@@ -37,7 +37,7 @@ def test_first_sample_starts_the_clock_and_samples_before_zero_do_not_count(writ
     np.testing.assert_allclose(record.times[[0, -1]], [begins, begins + 5.5])
 
 
-def test_scales_come_from_train_records_only(write, axis_columns):
+def test_scales_come_from_train_records_only_and_the_hold_of_a_record_wins(write, axis_columns):
     toml = AXIS.format("[constants]\ngain = 35.0") + HOLDOUT
     holdout = {name: values if name == "time_s" else values * 10 for name, values in axis_columns.items()}
     campaign = read_campaign(write(toml, move=axis_columns, hold=holdout))
@@ -45,12 +45,14 @@ def test_scales_come_from_train_records_only(write, axis_columns):
     assert campaign.plant.scales.speed == pytest.approx(np.max(np.abs(axis_columns["velocity_m_s"])))
     assert (campaign.plant.scales.effort_unit, campaign.plant.scales.length_unit) == ("N", "m")
     assert driven_axis.scales.effort == 1.0
-
-
-@pytest.mark.parametrize(("told", "exact"), [("", ("gain",)), ("[tolerances]\ngain = 0", ()),
-                                             ("[tolerances]\ndefault = 0.02", ())])  # fmt: skip
-def test_a_constant_whose_tolerance_nobody_told_is_taken_as_exact(write_axis, told, exact):
-    assert read_campaign(write_axis(toml=AXIS.format(f"[constants]\ngain = 35.0\n{told}"))).taken_as_exact == exact
+    # a constant whose tolerance nobody told is taken as exact
+    for told, exact in (("", ("gain",)), ("[tolerances]\ngain = 0", ()), ("[tolerances]\ndefault = 0.02", ())):
+        toml = AXIS.format(f"[constants]\ngain = 35.0\n{told}")
+        assert read_campaign(write(toml, move=axis_columns)).taken_as_exact == exact
+    toml = AXIS.format('hold = "zero"') + HOLDOUT + 'hold = "linear"\n'
+    records = read_campaign(write(toml, move=axis_columns, hold=axis_columns)).records
+    assert [r.manoeuvre.hold for r in records] == ["zero", "linear"]
+    assert isinstance(records[0].manoeuvre, Manoeuvre)
 
 
 @pytest.mark.parametrize(("speed", "position", "factor"), [
@@ -98,13 +100,6 @@ def test_named_inputs_win_and_degrees_become_radians(write, axis_columns):
     np.testing.assert_array_equal(manoeuvre.inputs["wind"], 0.0)
 
 
-def test_hold_of_the_record_wins(write, axis_columns):
-    toml = AXIS.format('hold = "zero"') + HOLDOUT + 'hold = "linear"\n'
-    records = read_campaign(write(toml, move=axis_columns, hold=axis_columns)).records
-    assert [r.manoeuvre.hold for r in records] == ["zero", "linear"]
-    assert isinstance(records[0].manoeuvre, Manoeuvre)
-
-
 @pytest.mark.parametrize(("more", "change", "fragments"), [
     ("restart_s = 9.0\n", {}, ["restart_s is 9", "5.501"]),
     ("restart_s = 0.01\n", {}, ["restart_s is 0.01", "10 samples", "20"]),
@@ -149,15 +144,12 @@ def read(folder):
     return read_campaign(folder, plants={"servo": SERVO})
 
 
-def test_its_scales_stay_and_an_optional_input_has_its_default(write, axis_columns):
+def test_scales_stay_an_optional_input_has_its_default_and_a_start_position_needs_a_column(write, axis_columns):
     campaign = read(write(SERVO_TOML, move=axis_columns))
     assert campaign.plant.scales == SERVO.scales
     np.testing.assert_array_equal(campaign.records[0].manoeuvre.inputs["fan"], 1.0)
     off = {**axis_columns, "fan": np.zeros(5501)}
     np.testing.assert_array_equal(read(write(SERVO_TOML, move=off)).records[0].manoeuvre.inputs["fan"], 0.0)
-
-
-def test_a_start_position_needs_a_column(write, axis_columns):
     columns = {name: values for name, values in axis_columns.items() if name != "position_m"}
     with pytest.raises(ArmidError, match=r"campaign/move\.csv, line 1: .*'servo' declares it: a column position_m"):
         read(write(SERVO_TOML, move=columns))

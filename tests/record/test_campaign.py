@@ -50,7 +50,7 @@ def write_two(write, arm_columns):
     return lambda **parts: write(arm(**parts), lower=arm_columns, empty=arm_columns)
 
 
-def test_folder_and_file_read_alike(write_two):
+def test_folder_and_file_read_alike_and_samples_before_zero_are_rest(write_two, arm_columns):
     folder = write_two()
     by_folder, by_file = read_campaign(folder), read_campaign(str(folder / "campaign.toml"))
     assert by_folder.name == by_file.name == "c00"
@@ -62,9 +62,6 @@ def test_folder_and_file_read_alike(write_two):
     assert [r.file for r in by_folder.train] == ["lower.csv"]
     assert [r.file for r in by_folder.holdout] == ["empty.csv"]
     assert by_folder.holdout[0].repeat_of == "lower.csv"
-
-
-def test_samples_before_zero_are_rest(write_two, arm_columns):
     record = read_campaign(write_two()).train[0]
     speed = arm_columns["angular_velocity_deg_s"] * DEGREE
     np.testing.assert_array_equal(record.rest, speed[:100])
@@ -91,6 +88,13 @@ def test_constants_are_laid_over_each_other(write_two):
     assert (first.constants["shell"], second.constants["shell"]) == (1.0, 0.0)
     assert second.constants["theta_C"] == pytest.approx(-40 * DEGREE)
     assert first.pieces[0].manoeuvre.constants == first.constants
+    hum = Effect("hum", (Parameter("size", "effort", 0.0, 0.1, null=0.0),), {"torque": lambda size: size})
+    folder = write_two(top="[parameters.hum.size]\nhigh = 4.0")
+    with pytest.raises(ArmidError, match=r"hum\.size"):
+        read_campaign(folder)
+    assert read_campaign(folder, effects={**EFFECTS, "hum": hum}).parameters["hum.size"].high == 4.0
+    with pytest.raises(ArmidError, match="shell_transfer_arm"):
+        read_campaign(folder, plants={"driven_axis": PLANTS["driven_axis"]})
 
 
 @pytest.mark.parametrize("text", [
@@ -101,16 +105,6 @@ def test_constants_are_laid_over_each_other(write_two):
 def test_parameters_by_either_spelling(write_two, text):
     campaign = read_campaign(write_two(top=text))
     assert campaign.parameters == {"p0": Override(low=2.9e6, high=3.2e6), "coulomb.width": Override(fixed=0.01)}
-
-
-def test_own_plants_and_effects_can_be_named(write_two):
-    hum = Effect("hum", (Parameter("size", "effort", 0.0, 0.1, null=0.0),), {"torque": lambda size: size})
-    folder = write_two(top="[parameters.hum.size]\nhigh = 4.0")
-    with pytest.raises(ArmidError, match=r"hum\.size"):
-        read_campaign(folder)
-    assert read_campaign(folder, effects={**EFFECTS, "hum": hum}).parameters["hum.size"].high == 4.0
-    with pytest.raises(ArmidError, match="shell_transfer_arm"):
-        read_campaign(folder, plants={"driven_axis": PLANTS["driven_axis"]})
 
 
 @pytest.mark.parametrize("encode", [
@@ -131,17 +125,7 @@ def test_spellings_of_csv(write, encode):
 TABLES = {"a.csv": {"time_s": np.arange(5) / 3, "velocity_m_s": np.array([0.1, 1e-300, -7.0, 1 / 3, 1e20])}}
 
 
-def test_numbers_read_back_to_the_bit(tmp_path):
-    folder = write_campaign(tmp_path / "deep" / "out", "name = 'x'\n", TABLES)
-    assert (folder / "campaign.toml").read_text() == "name = 'x'\n"
-    columns = read_table(folder / "a.csv", "a.csv").columns
-    assert list(columns) == ["time_s", "velocity_m_s"]
-    for name, values in TABLES["a.csv"].items():
-        np.testing.assert_array_equal(columns[name], values)
-    assert [p.name for p in folder.parent.iterdir()] == ["out"]
-
-
-def test_nothing_is_overwritten_and_nothing_half_written_stays(tmp_path):
+def test_nothing_is_overwritten_or_half_written_and_numbers_read_back_to_the_bit(tmp_path):
     (tmp_path / "empty").mkdir()
     folder = write_campaign(tmp_path / "empty", "", TABLES)
     for there in (folder, folder / "a.csv"):
@@ -153,3 +137,10 @@ def test_nothing_is_overwritten_and_nothing_half_written_stays(tmp_path):
     with pytest.raises(ValueError, match="shorter"):
         write_campaign(tmp_path / "out", "", uneven)
     assert list(tmp_path.iterdir()) == [folder]
+    folder = write_campaign(tmp_path / "deep" / "out", "name = 'x'\n", TABLES)
+    assert (folder / "campaign.toml").read_text() == "name = 'x'\n"
+    columns = read_table(folder / "a.csv", "a.csv").columns
+    assert list(columns) == ["time_s", "velocity_m_s"]
+    for name, values in TABLES["a.csv"].items():
+        np.testing.assert_array_equal(columns[name], values)
+    assert [p.name for p in folder.parent.iterdir()] == ["out"]

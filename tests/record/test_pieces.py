@@ -12,15 +12,11 @@ TIMES = np.arange(1500) / 500
 MOTION = 3.0 * np.sin(8.0 * TIMES) + 0.5 * np.sin(25.0 * TIMES)
 
 
-@pytest.mark.parametrize("index", [0, 700, 1499])
-def test_a_signal_without_noise_is_not_smoothed(index):
-    assert smoothed(MOTION, index, 0.0) == (MOTION[index], 0.0)
-    value, deviation = smoothed(MOTION, index, 1e-12)
-    assert value == pytest.approx(MOTION[index], abs=5e-12)
-    assert deviation <= 1e-12
-
-
-def test_a_line_is_smoothed_over_the_longest_window():
+def test_without_noise_nothing_is_smoothed_a_line_over_the_longest_window_and_a_kink_ends_it():
+    for index in (0, 700, 1499):
+        assert smoothed(MOTION, index, 0.0) == (MOTION[index], 0.0)
+        value, deviation = smoothed(MOTION, index, 1e-12)
+        assert (value, deviation <= 1e-12) == (pytest.approx(MOTION[index], abs=5e-12), True)
     line = 2.0 - 5.0 * TIMES
     end, middle = smoothed(line, 0, 0.1), smoothed(line, 700, 0.1)
     assert end[0] == pytest.approx(2.0, abs=1e-12)
@@ -28,9 +24,13 @@ def test_a_line_is_smoothed_over_the_longest_window():
     # of degree 1 + 2, the lower of the two degrees: 16/n at the end, 9/4n in the middle, n near 400
     assert end[1] == pytest.approx(0.1 * np.sqrt(16 / 370), rel=0.1)
     assert middle[1] == pytest.approx(0.1 * np.sqrt(9 / 4 / 370), rel=0.1)
+    kinked = np.where(TIMES < 1.0, 0.0, 40.0 * (TIMES - 1.0))
+    rng = np.random.default_rng(3)
+    errors = [smoothed(kinked + rng.normal(0.0, 0.01, TIMES.size), 500, 0.01)[0] for _ in range(100)]
+    assert np.sqrt(np.mean(np.square(errors))) < 0.02
 
 
-def test_a_machine_at_rest_starts_at_rest():
+def test_a_machine_at_rest_starts_at_rest_and_the_deviation_is_honest():
     """While no input changes and the signal stands still its slope is 0; a motion under a still input keeps its own."""
     rng, rest = np.random.default_rng(6), 60
     begun = np.concatenate([np.zeros(rest), MOTION[:400]]) + rng.normal(0.0, 0.1, rest + 400)
@@ -42,10 +42,7 @@ def test_a_machine_at_rest_starts_at_rest():
     assert abs(smoothed(begun, 0, 0.1, still=rest)[0]) < 3.0 * 0.1 / np.sqrt(rest)
     moving = 3.0 * TIMES[:rest] + rng.normal(0.0, 0.01, rest)
     assert smoothed(moving, 0, 0.01, slope=True, still=rest)[0] == pytest.approx(3.0 / 500, rel=0.1)
-
-
-def test_the_deviation_is_honest():
-    """Over 300 noises on a motion that turns and jerks, errors are as large as they are said to be."""
+    # Over 300 noises on a motion that turns and jerks, errors are as large as they are said to be.
     for noise, index in ((1e-3, 0), (1e-3, 700), (1e-2, 333), (0.1, 0), (0.1, 333)):
         rng = np.random.default_rng(2)
         found = [smoothed(MOTION + rng.normal(0.0, noise, TIMES.size), index, noise) for _ in range(300)]
@@ -54,22 +51,12 @@ def test_the_deviation_is_honest():
         assert np.mean([deviation for _, deviation in found]) < noise
 
 
-def test_a_coarse_rest_tells_a_speed_although_short_windows_fail_by_chance():
+def test_a_coarse_rest_tells_a_speed_and_its_steps_do_not_average_out():
     for seed in range(100):
         values = np.round(np.random.default_rng(seed).normal(0.0, 0.4, 140))
         slope, deviation = smoothed(values, 0, 0.49, slope=True)
         assert deviation < 0.05
         assert abs(slope) < 5.0 * deviation
-
-
-def test_a_kink_ends_the_window():
-    kinked = np.where(TIMES < 1.0, 0.0, 40.0 * (TIMES - 1.0))
-    rng = np.random.default_rng(3)
-    errors = [smoothed(kinked + rng.normal(0.0, 0.01, TIMES.size), 500, 0.01)[0] for _ in range(100)]
-    assert np.sqrt(np.mean(np.square(errors))) < 0.02
-
-
-def test_steps_of_a_sensor_at_rest_do_not_average_out():
     state, deviation = state_at({"start_position": Track(np.full(300, 0.005), 0.0029, 0.01)}, 100)
     assert state["start_position"] == pytest.approx(0.005)
     assert deviation["start_position"] == pytest.approx(0.01 / np.sqrt(12))

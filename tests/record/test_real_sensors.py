@@ -51,13 +51,6 @@ def refused(write, columns, **given):
     return str(caught.value)
 
 
-def residual_at(record, campaign, value):
-    """Return the residual of the samples that are data at an inertia."""
-    model = Model(campaign.plant)
-    (replay,) = replays([record], model, space_of(model))
-    return replay.measured - replay.signal(np.array([[value]]))[0], replay
-
-
 @pytest.mark.parametrize("uneven", [0.0, 0.1])
 def test_a_speed_that_is_renewed_every_18th_sample_counts_once_a_renewal(write, uneven):
     columns = wheel(damping=1e-9)
@@ -72,7 +65,10 @@ def test_a_speed_that_is_renewed_every_18th_sample_counts_once_a_renewal(write, 
     assert signal.broken == ()
     assert record.n_samples == pytest.approx(N / 18, abs=1)
     assert record.noise.rms == pytest.approx(0.02, rel=0.35)
-    residual, replay = residual_at(record, campaign, 0.25)
+    model = Model(campaign.plant)
+    (replay,) = replays([record], model, space_of(model))
+    # of the samples that are data, at an inertia of 0.25
+    residual = replay.measured - replay.signal(np.array([[0.25]]))[0]
     assert len(residual) == len(replay.times) == record.n_samples
     np.testing.assert_allclose(np.diff(replay.times), 18 * INTERVAL, atol=2e-3 * (uneven > 0) + 1e-9)
     # neither the holds nor the jitter of the clock are in it

@@ -142,7 +142,20 @@ def test_saturation(write, arm_columns, step, sign):
     assert abs(speed[line - 2]) >= 200 - 1.001 * step > abs(speed[line - 3])
 
 
-def test_units_that_differ(write):
+def test_other_than_a_campaign_links_out_of_its_folder_and_units_that_differ(write, tmp_path):
+    folder = write(GOOD, lower=csv())
+    assert read_campaign(folder).records[0].n_samples == 60
+    assert_says(refusal(tmp_path / "nothing"), ["nothing' does not exist", "campaign.toml"])
+    assert_says(refusal(tmp_path), ["holds no campaign.toml"])
+    assert_says(refusal(folder / "lower.csv"), ["lower.csv' is a record", "campaign.toml is expected"])
+    assert_says(refusal("a\0b"), ["does not exist"])
+    (folder / "lower.csv").rename(tmp_path / "outside.csv")
+    os.symlink(tmp_path / "outside.csv", folder / "lower.csv")
+    assert_says(refusal(folder), ["'lower.csv'", "links out of the campaign's folder"])
+    (folder / "lower.csv").unlink()
+    os.symlink("lower.csv", folder / "lower.csv")
+    assert_says(refusal(folder), ["'lower.csv' does not exist"])
+    (folder / "lower.csv").unlink()
     second = ENTRY.replace("lower.csv", "second.csv")
     toml = GOOD.replace("shell_transfer_arm", "driven_axis").split("[[records]]")[0]
     toml += '[[records]]\nfile="lower.csv"\nrole="train"\n[[records]]\nfile="second.csv"\nrole="holdout"\n'
@@ -152,25 +165,6 @@ def test_units_that_differ(write):
     assert_says(refusal(folder), ["second.csv", "m/s", "rad/s is expected", "lower.csv"])
     folder = write(GOOD + second, lower=csv(), second=csv("time_s,velocity_m_s"))
     assert_says(refusal(folder), ["second.csv, line 1", "m/s", "shell_transfer_arm"])
-
-
-def test_links_out_of_the_folder(write, tmp_path):
-    folder = write(GOOD, lower=csv())
-    (folder / "lower.csv").rename(tmp_path / "outside.csv")
-    os.symlink(tmp_path / "outside.csv", folder / "lower.csv")
-    assert_says(refusal(folder), ["'lower.csv'", "links out of the campaign's folder"])
-    (folder / "lower.csv").unlink()
-    os.symlink("lower.csv", folder / "lower.csv")
-    assert_says(refusal(folder), ["'lower.csv' does not exist"])
-
-
-def test_other_than_a_campaign(write, tmp_path):
-    folder = write(GOOD, lower=csv())
-    assert read_campaign(folder).records[0].n_samples == 60
-    assert_says(refusal(tmp_path / "nothing"), ["nothing' does not exist", "campaign.toml"])
-    assert_says(refusal(tmp_path), ["holds no campaign.toml"])
-    assert_says(refusal(folder / "lower.csv"), ["lower.csv' is a record", "campaign.toml is expected"])
-    assert_says(refusal("a\0b"), ["does not exist"])
 
 
 def test_what_is_too_large_or_counts_nowhere(write, tmp_path):

@@ -78,7 +78,7 @@ def found(values, noise=NOISE, sensor=FINE, sudden=NEVER, known=False):
     return {kind: np.flatnonzero(mask) for kind, mask in kinds.items() if mask.any()}
 
 
-def test_a_sensor_that_froze_and_one_at_its_limit_are_found_where_they_are():
+def test_a_sensor_that_froze_and_one_at_its_limit_are_found_and_a_sound_one_has_no_fault():
     stuck = signal()
     stuck[300:340] = stuck[300]
     assert {k: v.tolist() for k, v in found(stuck).items()} == {"stuck": list(range(300, 340))}
@@ -87,9 +87,6 @@ def test_a_sensor_that_froze_and_one_at_its_limit_are_found_where_they_are():
         assert {k: v.tolist() for k, v in found(clipped, known=known).items()} == {
             "clipped": np.flatnonzero(signal() > limit).tolist()
         }
-
-
-def test_a_sound_sensor_has_none():
     assert found(signal()) == {}
     assert found(0.05 * np.round(signal() / 0.05), sensor=Sensor(0.05)) == {}
     # a motor that starts at once, reaches an even speed, and stands again; its noise as taken from the motion is large
@@ -134,7 +131,7 @@ def rng():
     return np.random.default_rng(7)
 
 
-def test_white_rest(rng):
+def test_white_rest_of_any_length(rng):
     noise = noise_of(0.02 + rng.normal(0, 0.005, 20_000), MOTION, INTERVAL)
     assert noise.source == "rest"
     assert noise.n_samples == 20_000
@@ -142,16 +139,13 @@ def test_white_rest(rng):
     assert noise.rms == pytest.approx(0.005, rel=0.03)
     assert noise.effective_fraction > 0.95
     assert noise.correlation_time_s < 0.2 * INTERVAL
-
-
-def test_short_white_rest_stays_white(rng):
     fractions = [noise_of(rng.normal(0, 1, 100), MOTION, INTERVAL).effective_fraction for _ in range(200)]
     assert np.median(fractions) == 1.0
     alternating = np.diff(rng.normal(0, 1, 20_001))
     assert noise_of(alternating, MOTION, INTERVAL).effective_fraction == 1.0
 
 
-def test_a_sensor_that_is_stuck_tells_nothing_of_its_noise(rng):
+def test_a_sensor_that_is_stuck_tells_nothing_of_its_noise_and_a_silent_rest_that_of_its_steps(rng):
     signal = np.round((MOTION + rng.normal(0, 0.01, MOTION.size)) / 0.002) * 0.002
     stuck = signal.copy()
     stuck[500:1300] = stuck[500]
@@ -161,6 +155,14 @@ def test_a_sensor_that_is_stuck_tells_nothing_of_its_noise(rng):
     coarse = np.round(MOTION / 0.05) * 0.05
     assert difference_rms(coarse) < 0.01
     assert noise_of(np.zeros(0), coarse, INTERVAL).rms >= 0.05 / np.sqrt(12) * (1 - 1e-9)
+    for level in (0.0, 0.1):
+        noise = noise_of(np.full(100, level), MOTION, INTERVAL)
+        assert (noise.correlation_time_s, noise.effective_fraction) == (0.0, 1.0)
+        # the rounding of the largest value is left
+        assert 0.0 < noise.rms < 1e-15
+        assert noise.mean == pytest.approx(level)
+    noise = noise_of(np.zeros(100), np.round(MOTION, 2), INTERVAL)
+    assert noise.rms == pytest.approx(0.01 / np.sqrt(12))
 
 
 @pytest.mark.parametrize("time_constant", [0.002, 0.01])
@@ -173,26 +175,12 @@ def test_coloured_rest(rng, time_constant):
     assert noise.effective_fraction == pytest.approx((1 - phi) / (1 + phi), rel=0.1)
 
 
-def test_a_silent_rest_has_the_noise_of_the_steps_of_the_signal():
-    for level in (0.0, 0.1):
-        noise = noise_of(np.full(100, level), MOTION, INTERVAL)
-        assert (noise.correlation_time_s, noise.effective_fraction) == (0.0, 1.0)
-        # the rounding of the largest value is left
-        assert 0.0 < noise.rms < 1e-15
-        assert noise.mean == pytest.approx(level)
-    noise = noise_of(np.zeros(100), np.round(MOTION, 2), INTERVAL)
-    assert noise.rms == pytest.approx(0.01 / np.sqrt(12))
-
-
 @pytest.mark.parametrize("n_rest", [0, 49, 100])
 def test_few_rest_samples_or_such_as_read_one_value_leave_the_differences(rng, n_rest):
     noise = noise_of(np.zeros(n_rest), MOTION + rng.normal(0, 0.005, MOTION.size), INTERVAL)
     assert (noise.source, noise.n_samples) == ("differences", MOTION.size)
     assert n_rest == 100 or noise.mean is None
     assert noise.rms == pytest.approx(0.005, rel=0.1)
-
-
-def test_differences_keep_transients_out(rng):
     jerky = MOTION + np.where(np.arange(2000) % 400 < 60, np.sin(np.arange(2000)), 0.0)
     assert difference_rms(jerky + rng.normal(0, 0.005, 2000)) == pytest.approx(0.005, rel=0.3)
 

@@ -29,14 +29,7 @@ def test_rounded_times_are_even(write, rate, digits):
     assert record.manoeuvre.interval == pytest.approx(1 / rate, rel=2e-5)
 
 
-def test_slow_drift_is_resampled_without_a_word(write):
-    index = np.arange(2000)
-    record = read(write, index / 1000 * (1 + 1e-7 * index))
-    assert record.irregularity is None
-    np.testing.assert_allclose(record.measured, motion(record.times), atol=2e-6)
-
-
-def test_a_grid_that_misses_zero_is_shifted_onto_it(write):
+def test_a_grid_that_misses_zero_slow_drift_and_a_lost_first_sample_are_mended_without_a_word(write):
     times = (np.arange(-100, 1000) + 0.4) / 1000
     record = read(write, times)
     assert record.irregularity is None
@@ -45,9 +38,10 @@ def test_a_grid_that_misses_zero_is_shifted_onto_it(write):
     assert record.rest.size == 100
     assert record.pieces[0].window == slice(0, record.measured.size)
     np.testing.assert_allclose(record.measured, motion(record.times), atol=3e-5)
-
-
-def test_a_lost_first_sample_does_not_count(write):
+    index = np.arange(2000)
+    record = read(write, index / 1000 * (1 + 1e-7 * index))
+    assert record.irregularity is None
+    np.testing.assert_allclose(record.measured, motion(record.times), atol=2e-6)
     record = read(write, np.arange(1, 1000) / 1000)
     assert record.times[0] == 0.0
     assert record.pieces[0].window == slice(1, 1000)

@@ -35,20 +35,16 @@ def column(page, table, number):
 
 @pytest.mark.parametrize(("width", "dark"), [(1200, False), (1200, True), (400, False), (400, True)])
 def test_opens_quietly_and_does_not_scroll_sideways(pages, opened, width, dark):
-    for path in pages.values():
-        opens_quietly(opened(path, width, dark), width, dark)
-
-
-def opens_quietly(page, width, dark):
-    assert page.get_log("browser") == []
-    assert seen(page, "document.documentElement.scrollWidth") <= width
-    assert "broken" not in page.title.split("<")[0]
-    ink, paper = (
-        [int(n) for n in re.findall(r"\d+", seen(page, f"getComputedStyle(document.body).{key}"))[:3]]
-        for key in ("color", "backgroundColor")
-    )  # fmt: skip
-    assert (sum(paper) < sum(ink)) == dark
-    assert contrast(ink, paper) > 7.0
+    for page in (opened(path, width, dark) for path in pages.values()):
+        assert page.get_log("browser") == []
+        assert seen(page, "document.documentElement.scrollWidth") <= width
+        assert "broken" not in page.title.split("<")[0]
+        ink, paper = (
+            [int(n) for n in re.findall(r"\d+", seen(page, f"getComputedStyle(document.body).{key}"))[:3]]
+            for key in ("color", "backgroundColor")
+        )  # fmt: skip
+        assert (sum(paper) < sum(ink)) == dark
+        assert contrast(ink, paper) > 7.0
 
 
 def contrast(first, second):

@@ -46,17 +46,13 @@ class Elements(HTMLParser):
         return " ".join(" ".join(self.texts).split())
 
 
-def page_of(folder):
-    return Elements(html(document_of(folder, LOOP, "results/arm")))
-
-
 def printed(document, capsys):
     show(document)
     return capsys.readouterr().out
 
 
 def test_a_closed_loop_says_what_the_issue_asks_for(tmp_path):
-    page = page_of(write_loop(tmp_path / "loop"))
+    page = Elements(html(document_of(write_loop(tmp_path / "loop"), LOOP, "results/arm")))
     for wanted in (
         "What does the declared model of shell_transfer_arm lack", "Effects cannot be told apart: It lacks arm.",
         "Error on the records held out: 1.719 before, 0.3438 deg/s RMSE after; the noise is 0.229 deg/s.",
@@ -75,15 +71,15 @@ def test_a_closed_loop_says_what_the_issue_asks_for(tmp_path):
     assert len(ids) == len(set(ids)) > 5
 
 
-def test_a_constant_far_from_its_declared_value_is_reported():
+def test_a_constant_far_off_a_drift_and_an_output_that_is_not_there_are_called_so():
     fit = SimpleNamespace(deviations={"length": -4.02, "load_mass": 1.9})
     assert constant_sentences(fit) == ["length is 4.0 deviations from its declared value."]
-
-
-def test_a_drift_is_called_a_drift():
     report = loop_report()
     report["probabilities"]["drifts"] = {"mass": 0.38, "constant:force_constant": 0.4}
     assert "; drift of mass 0.38; drift of force_constant 0.40; nothing" in chances_sentence(report)
+    entry = {"rmse": None, "outputs": {"deflection": {"rmse": 0.1}}}
+    assert [rmse_text({"rmse": None}, "rad"), rmse_text(entry, "rad")] == ["not finite", "not recorded"]
+    assert rmse_text({"rmse": None, "outputs": {"hub": {"rmse": None}}}, "rad") == "not finite"
 
 
 def test_terminal_markdown_and_page_give_the_same_answer_first(tmp_path, capsys):
@@ -101,12 +97,6 @@ def test_terminal_markdown_and_page_give_the_same_answer_first(tmp_path, capsys)
         assert sentence in page
     # every figure of the Markdown is a file that the command writes
     assert set(re.findall(r"\]\((\w+)\.png\)", text)) == {"residuals", "probabilities", "diagnosis"}
-
-
-def test_an_output_that_is_not_there_has_not_diverged():
-    entry = {"rmse": None, "outputs": {"deflection": {"rmse": 0.1}}}
-    assert [rmse_text({"rmse": None}, "rad"), rmse_text(entry, "rad")] == ["not finite", "not recorded"]
-    assert rmse_text({"rmse": None, "outputs": {"hub": {"rmse": None}}}, "rad") == "not finite"
 
 
 def test_names_of_files_cannot_break_any_renderer(tmp_path, capsys):
@@ -129,13 +119,6 @@ NAMES = (
     "[x]: javascript:1", "%s {0}", "# head", "* * *", "swarm\\", "nelder_mead+pso_2",
     "=1+1", "+1 of it", "-x", "@sum",
 )  # fmt: skip
-
-
-def test_no_cell_of_a_file_is_a_formula():
-    """Names that begin like one are text, in the header too; numbers stay numbers."""
-    rows = [("=cmd|' /C calc'!A0", "-0.5", -0.5), ("\t=1", "plain", 2), (None, "@x", float("nan"))]
-    lines = csv(table("x", ["=1+1", "b", "c"], rows)).splitlines()
-    assert lines == ["'=1+1,b,c", "'=cmd|' /C calc'!A0,-0.5,-0.5", "'\t=1,plain,2.0", ",'@x,"]
 
 
 MARKUP = {"html_inline", "html_block", "link_open", "image", "em_open", "strong_open", "s_open", "code_inline"}
@@ -178,7 +161,7 @@ def test_names_in_figures_that_another_library_lays_out(name):
         assert name in "".join(Elements(svg_text(figure)).texts)
 
 
-def test_a_table_and_a_listing_stay_what_they_are():
+def test_a_table_a_listing_and_sentences_stay_what_they_are_and_no_cell_of_a_file_is_a_formula():
     columns, rows = ["who|[a](b)"], [["a\n|b"], ["[x]: javascript:1"], ["\\](c)"]]
     listing = Listing("L", (Line("a"), Line("```", "+")))
     text = markdown(Document("t", "Study", "", ("Yes.",), (Section("S", (table("T", columns, rows), listing)),)))
@@ -187,9 +170,15 @@ def test_a_table_and_a_listing_stay_what_they_are():
     assert "| \\\\\\](c) |" in text
     assert text.rstrip().splitlines()[-4:] == ["````diff", "  a", "+ ```", "````"]
     assert "\\textbackslash" in latex(table("T", ["a"], [["\\x_&"]]))
+    # Names that begin like one are text, in the header too; numbers stay numbers.
+    rows = [("=cmd|' /C calc'!A0", "-0.5", -0.5), ("\t=1", "plain", 2), (None, "@x", float("nan"))]
+    lines = csv(table("x", ["=1+1", "b", "c"], rows)).splitlines()
+    assert lines == ["'=1+1,b,c", "'=cmd|' /C calc'!A0,-0.5,-0.5", "'\t=1,plain,2.0", ",'@x,"]
+    document = Document("t", "Study", "", ("Yes.",), (Section("S", (Sentences(("a", "b"), "S"),)),), facts=("f",))
+    assert markdown(document) == "# t\n\n**Yes.**\n\n- f\n\n## S\n\n- a\n- b\n"
 
 
-def test_nothing_is_fetched_and_only_the_page_s_own_script_runs(tmp_path):
+def test_nothing_is_fetched_only_the_page_s_own_script_runs_and_many_records_make_no_large_page(tmp_path):
     folder = write_loop(tmp_path / "loop")
     text = html(document_of(folder, LOOP, "x"))
     assert text == html(document_of(folder, LOOP, "x"))
@@ -199,14 +188,11 @@ def test_nothing_is_fetched_and_only_the_page_s_own_script_runs(tmp_path):
     policy = re.search(r'Policy" content="([^"]+)"', text).group(1)
     assert "default-src 'none'" in policy
     assert "script-src 'sha256-" in policy
-
-
-def test_many_long_records_make_no_large_page():
     details = loop_details(n_records=6, n_points=1000)
     assert len(html(loop_document(loop_report(), details, {}, "x"))) < 0.9e6
 
 
-def test_a_study_gives_its_answer_state_tables_and_file(capsys):
+def test_a_study_gives_its_answer_state_tables_and_file_and_columns_and_intervals_as_they_are(capsys):
     document = study_document()
     page = Elements(html(document))
     for wanted in ("Is made_up right?", "Yes, made_up.", "Complete: 4 of 4 runs.", "Words of made_up.",
@@ -217,6 +203,15 @@ def test_a_study_gives_its_answer_state_tables_and_file(capsys):
     shown = printed(document, capsys)
     assert "identifier: made_up b" in shown
     assert "Words of made_up." in shown
+    rows = [("mass", "kg", "2.5", "a", ""), ("level", "N", "", "a", ""), ("slope", "N s/m", "", "a", "")]
+    columns, cells, note = varying(table("Parameters", ["name", "unit", "before", "said", "empty"], rows))
+    assert [c.key for c in columns] == ["name", "unit", "before"]
+    assert [[c.text for c in row] for row in cells] == [list(row[:3]) for row in rows]
+    assert note == "In every line said is a."
+    # an interval is shown with digits that tell its ends apart
+    for ends in (("0.0118", "0.011", "0.013"), ("0.01180006", "0.01179978", "0.01180033")):
+        shown = dict(zip(("value", "low", "high"), map(float, ends), strict=True), unit="kg m2", interval_holds=True)
+        assert value_text(shown) == "{} kg m2 ({} to {})".format(*ends)
 
 
 @pytest.mark.parametrize(("names", "said"), [
@@ -240,18 +235,13 @@ def test_a_damaged_result_is_one_sentence(tmp_path):
         assert not re.search(r"\n|Error|Expecting|line 1|codec", str(caught.value))
 
 
-def test_a_result_without_its_details_is_one_sentence(tmp_path):
-    """As `armid export reports` writes it."""
-    folder = write_loop(tmp_path / "loop")
-    (folder / "details.json").unlink()
-    with pytest.raises(ArmidError, match=r"or a file next to it, is not what `armid close-loop` writes"):
-        document_of(folder, LOOP, "x")
-
-
-def test_damaged_details_are_one_sentence(tmp_path):
+def test_damaged_details_and_none_are_one_sentence(tmp_path):
+    """`armid export reports` writes none."""
     folder = write_loop(tmp_path / "loop", figures=False)
-    for key in sorted(set(loop_details()) - {"conclusion", "n_records", "n_files", "missing", "models"}):
+    for key in (*sorted(set(loop_details()) - {"conclusion", "n_records", "n_files", "missing", "models"}), None):
         (folder / "details.json").write_text(json.dumps(loop_details(n_records=1) | {key: 3}))
+        if key is None:
+            (folder / "details.json").unlink()
         with pytest.raises(ArmidError, match=r"or a file next to it, is not what `armid close-loop` writes"):
             document_of(folder, LOOP, "x")
 
@@ -265,11 +255,6 @@ def test_damaged_curves_are_one_sentence(tmp_path):
     with pytest.raises(SystemExit, match="2"):
         main(["report", str(folder)])
     assert sorted(p.name for p in folder.iterdir()) == ["details.json", "report.json"]
-
-
-def test_sentences_are_bullets_and_a_title_is_not_said_twice():
-    document = Document("t", "Study", "", ("Yes.",), (Section("S", (Sentences(("a", "b"), "S"),)),), facts=("f",))
-    assert markdown(document) == "# t\n\n**Yes.**\n\n- f\n\n## S\n\n- a\n- b\n"
 
 
 def around(inner: str) -> str:
@@ -307,15 +292,12 @@ HOSTILE = (
 )  # fmt: skip
 
 
-def test_nothing_that_runs_or_is_fetched_comes_through():
+def test_nothing_that_runs_or_is_fetched_comes_through_and_no_svg_and_bombs_are_refused():
     for evil in HOSTILE:
         made = str(inline(around(evil), "", ""))
         assert not re.search(r"elsewhere|javascript|svg\+xml", made), evil
         assert not re.search(r"<(script|a|foreignObject|iframe|style|animate|set)\b", made), evil
         assert not re.search(r"\son\w+\s*=", re.sub(r'"[^"]*"', '""', made)), evil
-
-
-def test_what_is_no_svg_and_a_bomb_of_entities_are_refused():
     levels = "".join(f'<!ENTITY l{i} "{f"&l{i - 1};" * 10}">' for i in range(1, 12))
     bomb = f'<!DOCTYPE svg [<!ENTITY l0 "lol">{levels}]><svg><text>&l11;</text></svg>'
     nested = f"<svg>{'<g>' * 20_000}{'</g>' * 20_000}</svg>"
@@ -337,19 +319,3 @@ def test_few_points_rising_with_both_ends_and_the_extremes(n, most, seed):
         assert values[kept].max() == values.max()
     if n <= most:
         assert len(kept) == n
-
-
-def test_a_column_that_is_empty_in_some_lines_is_not_told_as_the_same_in_all():
-    rows = [("mass", "kg", "2.5", "a", ""), ("level", "N", "", "a", ""), ("slope", "N s/m", "", "a", "")]
-    columns, cells, note = varying(table("Parameters", ["name", "unit", "before", "said", "empty"], rows))
-    assert [c.key for c in columns] == ["name", "unit", "before"]
-    assert [[c.text for c in row] for row in cells] == [list(row[:3]) for row in rows]
-    assert note == "In every line said is a."
-
-
-@pytest.mark.parametrize(("value", "low", "high", "text"), [
-    (0.0118, 0.011, 0.013, "0.0118 kg m2 (0.011 to 0.013)"),
-    (0.01180006, 0.01179978, 0.01180033, "0.01180006 kg m2 (0.01179978 to 0.01180033)"),
-])  # fmt: skip
-def test_an_interval_is_shown_with_digits_that_tell_its_ends_apart(value, low, high, text):
-    assert value_text({"unit": "kg m2", "value": value, "low": low, "high": high, "interval_holds": True}) == text

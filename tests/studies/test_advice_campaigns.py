@@ -1,6 +1,7 @@
 """Campaigns of the proof of advice: few strokes, then the same ones and one record more."""
 
 import json
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -55,7 +56,7 @@ def more(base: Path, reports: Path, out: Path) -> int:
     return make_more([str(out), *proof, "--base", str(base), "--reports", str(reports)])
 
 
-def test_each_effect_of_a_pair_is_true_in_turn_and_nothing_tells_of_it(base: Path) -> None:
+def test_each_effect_of_a_pair_is_true_in_turn_and_the_proof_asks_for_six_pairs_of_twenty(base: Path) -> None:
     key = key_of(base)
     assert sorted(key) == ["a01", "a02", "b01", "b02"] == sorted(each.name for each in base.iterdir())
     assert [entry["effects"][0]["name"] for entry in key.values()] == ["brush_drop", "coulomb", "viscous", "tilt"]
@@ -63,6 +64,14 @@ def test_each_effect_of_a_pair_is_true_in_turn_and_nothing_tells_of_it(base: Pat
         text = (base / name / "campaign.toml").read_text()
         assert not [word for word in ("coulomb", "brush", "tilt", "viscous", "effect") if word in text]
         assert len(read_campaign(base / name).train) == (1 if name.startswith("a") else 2)
+    proof = read_proof(PROOF)
+    assert (len(proof.pairs), proof.taken) == (6, 20)
+    assert len({frozenset(pair.names) for pair in proof.pairs}) == 6
+    for file in ("advice.toml", "advised.toml"):
+        rivals = tomllib.loads((PROOF.parent / file).read_text())["rivals"]
+        assert {pattern.rstrip("*"): set(names) for pattern, names in rivals.items()} == {
+            pair.letter: set(pair.names) for pair in proof.pairs
+        }
 
 
 def test_one_record_more_and_the_others_as_they_were(base: Path, tmp_path: Path) -> None:
@@ -87,16 +96,3 @@ def test_advice_that_the_arm_cannot_follow_leaves_the_campaign_as_it_was(base: P
     entry = key_of(tmp_path / "out")["a01_advised"]
     assert (entry["rank"], entry["next"]) == (None, None)
     assert sorted(f.name for f in (tmp_path / "out" / "a01_advised").glob("*.csv")) == ["lower.csv"]
-
-
-def test_the_proof_asks_for_six_pairs_of_twenty() -> None:
-    proof = read_proof(PROOF)
-    assert (len(proof.pairs), proof.taken) == (6, 20)
-    assert len({frozenset(pair.names) for pair in proof.pairs}) == 6
-    for file in ("advice.toml", "advised.toml"):
-        import tomllib
-
-        rivals = tomllib.loads((PROOF.parent / file).read_text())["rivals"]
-        assert {pattern.rstrip("*"): set(names) for pattern, names in rivals.items()} == {
-            pair.letter: set(pair.names) for pair in proof.pairs
-        }

@@ -57,7 +57,7 @@ def key_of(folder: Path) -> dict[str, Any]:
     return dict(json.loads(key_path(folder).read_text()))
 
 
-def test_the_suite_holds_what_the_question_asks() -> None:
+def test_the_suite_holds_what_the_question_asks_and_a_part_the_campaigns_of_the_whole() -> None:
     suite = read_suite(SUITE)
     cases = cases_of(suite, 1)
     counts = Counter(case.label for case in cases)
@@ -69,10 +69,6 @@ def test_the_suite_holds_what_the_question_asks() -> None:
     assert not {kind.name for kind in suite.unlisted} & LISTED
     for label in ("control", "single", "two", "unlisted"):
         assert Counter(case.coloured for case in cases if case.label == label)[True] * 2 == counts[label]
-
-
-def test_campaigns_of_a_part_are_those_of_the_whole() -> None:
-    cases = cases_of(read_suite(SUITE), 1)
     part = shuffled(cases, 1, ["coulomb"])
     assert {case.index for case in part.values()} == {case.index for case in cases if case.chosen(["coulomb"])}
     assert list(part) == [f"c{count:03d}" for count in range(len(part))]
@@ -89,7 +85,7 @@ def test_a_suite_is_the_same_from_one_process_or_two(small: Path, tmp_path: Path
     assert key_path(again).read_bytes() == key_path(small).read_bytes()
 
 
-def test_a_campaign_tells_nothing_of_its_truth(small: Path) -> None:
+def test_a_campaign_tells_nothing_of_its_truth_and_the_package_reads_it(small: Path) -> None:
     words = re.compile(r"effect|seed|true|noise|colou?r|white|p0|eta3|bias|class|index|key", re.IGNORECASE)
     assert sorted(each.name for each in small.iterdir()) == sorted(key_of(small)["campaigns"])
     assert {each.suffix for each in small.rglob("*") if each.is_file()} == {".toml", ".md", ".csv"}
@@ -99,9 +95,6 @@ def test_a_campaign_tells_nothing_of_its_truth(small: Path) -> None:
             assert not words.search(text), words.search(text)
             assert "SYNTHETIC and blind" in text
         assert (campaign / "lower.csv").read_text().startswith("time_s,angular_velocity_deg_s\n-0.200,")
-
-
-def test_the_package_reads_every_campaign(small: Path) -> None:
     for name, entry in key_of(small)["campaigns"].items():
         campaign = read_campaign(small / name)
         one = entry["class"] == "one_stroke"

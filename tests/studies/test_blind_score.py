@@ -17,21 +17,18 @@ def claim(verdict="explained", **groups):
     return Claim({name: frozenset((name, *others)) for name, others in groups.items()}, verdict)
 
 
-@pytest.mark.parametrize(
-    ("said", "answer"),
-    [
-        (claim(coulomb=()), "told apart"),
-        (claim("partly_explained", coulomb=()), "told apart"),
-        (claim("cannot_tell_apart", coulomb=("brush_drop",)), "still together"),
-        (claim("cannot_tell_apart", coulomb=()), "still together"),
-        (claim(coulomb=(), brush_drop=()), "still together"),
-        (claim(brush_drop=()), "wrong one"),
-        (claim("record_disagrees", coulomb=("brush_drop",)), "still together"),
-        (claim("record_disagrees", brush_drop=("coulomb",)), "still together"),
-        (claim("no_discrepancy"), "neither"),
-        (None, "missing"),
-    ],
-)
+@pytest.mark.parametrize(("said", "answer"), [
+    (claim(coulomb=()), "told apart"),
+    (claim("partly_explained", coulomb=()), "told apart"),
+    (claim("cannot_tell_apart", coulomb=("brush_drop",)), "still together"),
+    (claim("cannot_tell_apart", coulomb=()), "still together"),
+    (claim(coulomb=(), brush_drop=()), "still together"),
+    (claim(brush_drop=()), "wrong one"),
+    (claim("record_disagrees", coulomb=("brush_drop",)), "still together"),
+    (claim("record_disagrees", brush_drop=("coulomb",)), "still together"),
+    (claim("no_discrepancy"), "neither"),
+    (None, "missing"),
+])  # fmt: skip
 def test_one_answer_for_each_claim(said, answer):
     assert advice.answer("coulomb", said) == answer
 
@@ -54,23 +51,15 @@ def made(advised, random):
     return key, reports
 
 
-def judged_pairs(*choices):
-    """Return the rows of made campaigns, their rates, and question -> target."""
-    rows = advice.separations(*made(*choices))
+def test_rates_and_the_test_of_pairs_that_were_closed_for_both_choices(tmp_path):
+    rows = advice.separations(*made([1, 1, 1, 1, 0], [1, 0, 0, 0, 0]))
     rates = advice.rates(rows)
-    return rates.to_dict("records"), {t.question: t for t in advice.targets_of(rows, rates)}
-
-
-def test_rates_and_the_test_of_pairs():
-    (first, whole), aims = judged_pairs([1, 1, 1, 1, 0], [1, 0, 0, 0, 0])
+    (first, whole), aims = rates.to_dict("records"), {t.question: t for t in advice.targets_of(rows, rates)}
     assert (first["pair"], first["n"], first["tried"], first["in_doubt"]) == ("coulomb / brush_drop", 5, 9, 7)
     assert (first["advised"], first["random"], whole["advised"]) == (0.8, 0.2, 0.8)
     assert first["p"] == pytest.approx(0.5**3)
     assert aims["all pairs: told apart by the advised record"].met
     assert aims["all pairs: lead over a random record"].met
-
-
-def test_a_campaign_that_was_closed_for_one_choice_alone_does_not_count(tmp_path):
     key, reports = made([1, 1, 1], [0, 0, 0])
     del reports["a02_random"]
     targets, sections = score.advice_parts(key, reports, {}, tmp_path)
@@ -146,9 +135,7 @@ def test_families_are_held_against_their_truth(tmp_path):
     assert len(pd.read_csv(tmp_path / "campaigns.csv")) == 8
 
 
-@pytest.fixture(scope="module")
-def suite(tmp_path_factory):
-    """A key of 120 made-up campaigns, the reports of all but one, and the page of them: folder, printed text."""
+def test_the_page_shows_every_table_and_figure_and_the_tables_agree_with_the_judgements(tmp_path_factory):
     folder, rng = tmp_path_factory.mktemp("scored"), np.random.default_rng(5)
     key = {f"c{i:03d}": made_entry(rng) for i in range(120)}
     for name, entry in [*key.items()][:-1]:
@@ -156,10 +143,7 @@ def suite(tmp_path_factory):
         (folder / "reports" / name / "report.json").write_text(json.dumps(made_report(rng, entry)))
     (folder / "key.json").write_text(json.dumps({"campaigns": key}))
     assert score.main([str(folder / "reports"), "--key", str(folder / "key.json"), "--out", str(folder / "out")]) == 0
-    return folder / "out"
-
-
-def test_the_page_shows_every_table_and_figure(suite):
+    suite = folder / "out"
     page = (suite / "report.md").read_text()
     assert "NOT COMPLETE: 119 of 120 campaigns" in page
     assert "| campaigns without a report | 1 | = 0 | 120 | missed |" in page
@@ -168,9 +152,6 @@ def test_the_page_shows_every_table_and_figure(suite):
     names = ("targets", "answers", "effects", "confusion", "false_alarms", "two", "unlisted", "one_stroke", "held_out")
     for table in (*names, "bias"):
         assert len(pd.read_csv(suite / f"{table}.csv")) > 0
-
-
-def test_the_tables_agree_with_the_judgements(suite):
     rows = pd.read_csv(suite / "campaigns.csv")
     single = rows[(rows["class"] == "single") & (rows["judgement"] != "missing")]
     assert set(single["answer"]) <= {*tables.ANSWERS}

@@ -28,7 +28,8 @@ def test_a_study_that_is_cut_short_has_seen_all_families_alike():
     assert (hidden.name, hidden.campaign) == ("hidden_000", "one_000")
 
 
-def test_names_that_nobody_can_tell_apart_share_their_truth():
+def test_names_that_nobody_can_tell_apart_share_their_truth_and_versions_are_compared_on_it():
+    truth = truth_of(ENTRY, hidden=False)
     truth = truth_of(ENTRY, hidden=False)
     assert truth.exact
     assert truth.holds("output_lag")
@@ -40,34 +41,25 @@ def test_names_that_nobody_can_tell_apart_share_their_truth():
     assert not all_found(truth, [frozenset({"drive_lag"})], 4)
     assert not truth_of(ENTRY, hidden=True).holds("drive_lag")
 
-
-def test_probabilities_that_come_true_have_no_error_and_sure_ones_that_do_not_have_all():
-    rng = np.random.default_rng(1)
-    p = rng.random(40_000)
-    honest = list(zip(p, (rng.random(p.size) < p).astype(float), strict=True))
-    assert calibration_error(honest) < 0.01
-    assert [n for n, *_ in reliability(honest)] == [4000] * 10
-    assert calibration_error([(0.9, 0.0)] * 20) == pytest.approx(0.9)
-
-
-def test_an_interval_that_misses_costs_forty_times_by_how_much():
-    assert interval_score([(1.0, 0.99, 1.01)]) == pytest.approx(0.02)
-    assert interval_score([(1.1, 1.05, 1.15)]) == pytest.approx(0.1 + 40.0 * 0.05)
-
-
-def test_both_versions_are_compared_on_the_campaigns_that_both_closed():
     def answer(low, high, cpu_s):
         return {"parameters": {"after": {"mass": {"value": 2.0, "low": low, "high": high}}}, "cpu_s": cpu_s}
 
     mine, its = answer(1.9, 2.1, 10.0), answer(2.0, 2.4, 5.0)
-    truth = truth_of(ENTRY, hidden=False)
     both = Closed("one_000", "one", "arm", "arm", truth, ENTRY, mine, its)
     assert both.beside_former() == [(pytest.approx(0.1), pytest.approx(0.2))]
     assert ratio_of(median)(both.times_beside_former()) == 2.0
     assert Closed("one_001", "one", "arm", "arm", truth, ENTRY, mine).beside_former() == []
 
 
-def test_a_target_is_met_where_the_interval_touches_it():
+def test_errors_of_probabilities_costs_of_intervals_and_targets_by_hand():
+    rng = np.random.default_rng(1)
+    p = rng.random(40_000)
+    honest = list(zip(p, (rng.random(p.size) < p).astype(float), strict=True))
+    assert calibration_error(honest) < 0.01
+    assert [n for n, *_ in reliability(honest)] == [4000] * 10
+    assert calibration_error([(0.9, 0.0)] * 20) == pytest.approx(0.9)
+    assert interval_score([(1.0, 0.99, 1.01)]) == pytest.approx(0.02)
+    assert interval_score([(1.1, 1.05, 1.15)]) == pytest.approx(0.1 + 40.0 * 0.05)
     sound = [[True]] * 19 + [[False]]
     found = score("S2", "made up", "arm", sound, lambda one: one, ">= 0.97")
     assert found.value == 0.95

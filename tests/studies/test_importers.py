@@ -100,14 +100,11 @@ def test_refused_files(emps, tmp_path):
             import_emps(emps, tmp_path / "out")
 
 
-def test_the_package_is_asked_where_no_folder_is_named(emps, tmp_path, monkeypatch):
+def test_the_package_is_asked_where_no_folder_is_named_and_missing_it_is_said(emps, tmp_path, monkeypatch):
     files = [str(emps / name) for name in ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat")]
     package = SimpleNamespace(EMPS=lambda data_file_locations: files if data_file_locations else None)
     monkeypatch.setitem(sys.modules, "nonlinear_benchmarks", package)
     assert read_campaign(import_emps(None, tmp_path / "out")).name == "emps"
-
-
-def test_a_missing_package_or_network_is_said(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "nonlinear_benchmarks", None)
     with pytest.raises(ArmidError, match=r"armid\[measured\]"):
         import_emps(None, tmp_path / "out")

@@ -19,69 +19,60 @@ TILT = ("tilt", (), True)
 CANDIDATE = ("viscous", (), False)
 
 
-@pytest.mark.parametrize(
-    ("label", "truths", "verdict", "steps", "word"),
-    [
-        ("control", (), "no_discrepancy", (), "right"),
-        ("control", (), "unexplained", (), "false_alarm"),
-        ("control", (), "explained", (COULOMB,), "false_alarm"),
-        ("control", (), "does_not_carry_over", (), "false_alarm"),
-        ("single", ("coulomb",), "explained", (COULOMB,), "right"),
-        ("single", ("coulomb",), "cannot_tell_apart", (PAIR,), "right"),
-        # what is claimed stands alone, whatever else is not impossible
-        ("single", ("seal_friction",), "explained", ((*PAIR[:2], True),), "wrong"),
-        ("single", ("seal_friction",), "cannot_tell_apart", (PAIR,), "group"),
-        ("single", ("coulomb",), "explained", (COULOMB, TILT), "right_with_extra"),
-        ("single", ("coulomb",), "partly_explained", (COULOMB, CANDIDATE), "right"),
-        ("single", ("viscous",), "explained", (COULOMB,), "wrong"),
-        ("single", ("e",), "cannot_tell_apart", (("a", ("b", "c", "d", "e"), False),), "wrong"),
-        ("single", ("viscous",), "cannot_tell_apart", (), "cannot_tell"),
-        ("single", ("viscous",), "no_discrepancy", (), "none"),
-        ("single", ("viscous",), "partly_explained", (CANDIDATE,), "none"),
-        ("single", ("viscous",), "cannot_tell_apart", (CANDIDATE,), "cannot_tell"),
-        ("single", ("coulomb",), "does_not_carry_over", (PAIR,), "none"),
-        ("two", ("coulomb", "tilt"), "explained", (TILT, COULOMB), "right"),
-        ("two", ("seal_friction", "tilt"), "cannot_tell_apart", (TILT, PAIR), "group"),
-        ("two", ("coulomb", "seal_friction"), "cannot_tell_apart", (PAIR,), "half"),
-        ("two", ("coulomb", "viscous"), "explained", (COULOMB, TILT), "half_with_extra"),
-        ("two", ("stribeck", "viscous"), "explained", (COULOMB, TILT), "wrong"),
-        ("unlisted", ("cam_bump",), "explained", (COULOMB,), "claimed"),
-        ("unlisted", ("cam_bump",), "partly_explained", (COULOMB,), "partial"),
-        ("unlisted", ("cam_bump",), "partly_explained", (CANDIDATE,), "none"),
-        ("unlisted", ("cam_bump",), "unexplained", (), "none"),
-        ("one_stroke", (), "explained", (COULOMB,), "false_alarm"),
-        ("one_stroke", ("coulomb",), "cannot_tell_apart", (("viscous", ("coulomb",), False),), "group"),
-    ],
-)
+@pytest.mark.parametrize(("label", "truths", "verdict", "steps", "word"), [
+    ("control", (), "no_discrepancy", (), "right"),
+    ("control", (), "unexplained", (), "false_alarm"),
+    ("control", (), "explained", (COULOMB,), "false_alarm"),
+    ("control", (), "does_not_carry_over", (), "false_alarm"),
+    ("single", ("coulomb",), "explained", (COULOMB,), "right"),
+    ("single", ("coulomb",), "cannot_tell_apart", (PAIR,), "right"),
+    # what is claimed stands alone, whatever else is not impossible
+    ("single", ("seal_friction",), "explained", ((*PAIR[:2], True),), "wrong"),
+    ("single", ("seal_friction",), "cannot_tell_apart", (PAIR,), "group"),
+    ("single", ("coulomb",), "explained", (COULOMB, TILT), "right_with_extra"),
+    ("single", ("coulomb",), "partly_explained", (COULOMB, CANDIDATE), "right"),
+    ("single", ("viscous",), "explained", (COULOMB,), "wrong"),
+    ("single", ("e",), "cannot_tell_apart", (("a", ("b", "c", "d", "e"), False),), "wrong"),
+    ("single", ("viscous",), "cannot_tell_apart", (), "cannot_tell"),
+    ("single", ("viscous",), "no_discrepancy", (), "none"),
+    ("single", ("viscous",), "partly_explained", (CANDIDATE,), "none"),
+    ("single", ("viscous",), "cannot_tell_apart", (CANDIDATE,), "cannot_tell"),
+    ("single", ("coulomb",), "does_not_carry_over", (PAIR,), "none"),
+    ("two", ("coulomb", "tilt"), "explained", (TILT, COULOMB), "right"),
+    ("two", ("seal_friction", "tilt"), "cannot_tell_apart", (TILT, PAIR), "group"),
+    ("two", ("coulomb", "seal_friction"), "cannot_tell_apart", (PAIR,), "half"),
+    ("two", ("coulomb", "viscous"), "explained", (COULOMB, TILT), "half_with_extra"),
+    ("two", ("stribeck", "viscous"), "explained", (COULOMB, TILT), "wrong"),
+    ("unlisted", ("cam_bump",), "explained", (COULOMB,), "claimed"),
+    ("unlisted", ("cam_bump",), "partly_explained", (COULOMB,), "partial"),
+    ("unlisted", ("cam_bump",), "partly_explained", (CANDIDATE,), "none"),
+    ("unlisted", ("cam_bump",), "unexplained", (), "none"),
+    ("one_stroke", (), "explained", (COULOMB,), "false_alarm"),
+    ("one_stroke", ("coulomb",), "cannot_tell_apart", (("viscous", ("coulomb",), False),), "group"),
+])  # fmt: skip
 def test_one_word_for_each_report(label: str, truths: tuple[str, ...], verdict: str, steps: Any, word: str) -> None:
     told = entry(label, *truths, listed=label != "unlisted")
     assert judge("c000", told, report(verdict, *steps))["judgement"] == word
 
 
-def test_a_wrong_name_with_a_group_is_not_alone() -> None:
+def test_a_wrong_name_with_a_group_is_not_alone_and_a_group_less_probable_than_a_claim_is_none() -> None:
     row = judge("c000", entry("single", "viscous"), report("cannot_tell_apart", PAIR))
     assert (row["wrong_alone"], row["wrong_group"], row["largest_group"], row["group_of_truth"]) == (False, True, 2, 0)
     row = judge("c000", entry("single", "viscous"), report("explained", COULOMB))
     assert (row["wrong_alone"], row["wrong_group"]) == (True, False)
-
-
-def test_a_group_that_is_less_probable_than_a_claim_is_none() -> None:
     told = report("cannot_tell_apart", PAIR)
     for probability, word in ((0.48, "right"), (0.47, "cannot_tell")):
         told["probabilities"]["effects"] = dict.fromkeys(("coulomb", "seal_friction"), probability)
         assert judge("c000", entry("single", "coulomb"), told)["judgement"] == word
 
 
-def test_errors_and_biases_are_reckoned() -> None:
+def test_errors_and_biases_are_reckoned_and_no_held_out_error_without_a_holdout() -> None:
     row = judge("c000", entry("single", "coulomb"), report("explained", COULOMB, after=0.006, bias=0.02))
     assert (row["before_over_floor"], row["after_over_floor"]) == pytest.approx((4.0, 1.2))
     assert row["cut"] == pytest.approx(0.7)
     assert row["excess_cut"] == pytest.approx(1.0 - (0.44 / 15.0) ** 0.5)
     assert row["bias_after_eta3"] == pytest.approx(0.02)
     assert row["trusted_n"] is False
-
-
-def test_a_record_without_holdout_has_no_held_out_error() -> None:
     told = report("cannot_tell_apart")
     told["error"]["before"]["holdout"] = told["error"]["after"]["holdout"] = None
     row = judge("c000", entry("one_stroke"), told)
@@ -93,7 +84,7 @@ def found(rows: list[dict[str, Any]], words: str) -> Target:
     return target
 
 
-def test_the_targets_count_what_they_say() -> None:
+def test_the_targets_count_what_they_say_or_nothing_and_one_stroke_may_not_be_trusted() -> None:
     right, wrong = (report("explained", step) for step in (COULOMB, TILT))
     rows = [judge("c", entry("single", "coulomb"), right) for _ in range(19)]
     held = "20 %: right name, or a group that holds it"
@@ -105,17 +96,11 @@ def test_the_targets_count_what_they_say() -> None:
     rows += [judge("c", entry("single", "coulomb", matters=False), wrong) for _ in range(9)]
     assert found(rows, held).among == 21
     assert found(rows, "20 %: share of all").found == pytest.approx(0.7)
-
-
-def test_a_target_that_nothing_tells_of_is_neither_met_nor_missed() -> None:
     assert {each.met for each in targets_of([], 0)[1:]} == {None}
     assert targets_of([], 3)[0].met is False
-
-
-@pytest.mark.parametrize(("trusted", "met"), [(0.0, False), (0.3, True)])
-def test_one_stroke_may_not_be_trusted(trusted: float, met: bool) -> None:
-    rows = [judge("c", entry("one_stroke"), report("no_discrepancy", bias=trusted))]
-    assert found(rows, "eta3 or n trusted").met is met
+    for trusted, met in ((0.0, False), (0.3, True)):
+        rows = [judge("c", entry("one_stroke"), report("no_discrepancy", bias=trusted))]
+        assert found(rows, "eta3 or n trusted").met is met
 
 
 @pytest.fixture

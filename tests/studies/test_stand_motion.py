@@ -51,13 +51,11 @@ def test_agrees_with_the_independent_integrator(row: dict[str, str]) -> None:
     assert found.switch_s == pytest.approx(float(row["switch_time_s"]), abs=1e-9)
 
 
-def test_a_record_that_ends_before_the_switch_has_none() -> None:
+def test_a_record_that_ends_before_the_switch_has_none_and_no_shell_does_not_rock() -> None:
     short = moved(duration_s=0.3)
     assert short.switch_s is None
     assert np.abs(short.gyro - moved().gyro[:301]).max() < 1e-9
-
-
-def test_every_effect_is_tested_here() -> None:
+    assert np.array_equal(moved(Effects(rocking_hz=10.0), "empty").gyro, moved(name="empty").gyro)
     assert {each.name for each in fields(Effects) if "of" not in each.metadata} == set(SIZES)
 
 
@@ -70,17 +68,10 @@ def test_an_effect_of_the_stand_alone_moves_the_arm_and_vanishes_near_its_null(n
     assert np.abs(vanished).max() < 1e-5
 
 
-def test_refuses_an_effect_too_stiff_to_integrate(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_refuses_an_effect_too_stiff_to_integrate_and_to_leave_the_travel(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("stand.motion.MOST_RATES", 20_000)
     with pytest.raises(RefusalError, match="too stiff"):
         moved(Effects(tachometer_lag=1e-9), "inside_E", 0.1)
-
-
-def test_no_shell_no_rocking() -> None:
-    assert np.array_equal(moved(Effects(rocking_hz=10.0), "empty").gyro, moved(name="empty").gyro)
-
-
-def test_refuses_to_leave_the_travel() -> None:
     with pytest.raises(RefusalError, match="leave the travel"):
         simulate(Motion(Arm(p0=9e6), KNOWN["lower"]), 1.2)
 
@@ -129,24 +120,16 @@ def test_a_sampled_controller_closes_its_loop_at_the_next_sample() -> None:
 MANY = 100_000
 
 
-@pytest.fixture(scope="module")
-def lowering() -> Trajectory:
-    return simulate(Motion(Arm(), KNOWN["lower"]), 0.7)
-
-
 def drawn(gyro: Gyro) -> "np.ndarray[tuple[int], np.dtype[np.float64]]":
     return np.asarray(noise(MANY, gyro, np.random.default_rng(7)))
 
 
-def test_the_noise_has_the_asked_rms_whatever_its_colour() -> None:
+def test_the_noise_has_the_asked_rms_and_its_colour() -> None:
     for bandwidth in (0.0, 20.0, 50.0):
         found = drawn(Gyro(noise_deg_s=0.25, noise_bandwidth_hz=bandwidth))
         assert found.size == MANY
         assert found.std() == pytest.approx(0.25, rel=0.03)
         assert abs(found.mean()) < 0.02
-
-
-def test_white_noise_is_white_and_coloured_noise_stays_in_the_band() -> None:
     share = []
     for bandwidth in (0.0, 50.0):
         power = np.abs(np.fft.rfft(drawn(Gyro(noise_bandwidth_hz=bandwidth)))) ** 2
@@ -156,7 +139,8 @@ def test_white_noise_is_white_and_coloured_noise_stays_in_the_band() -> None:
     assert share[1] < 0.05
 
 
-def test_a_record_rests_for_100_ms_and_then_follows_the_arm(lowering: Trajectory) -> None:
+def test_a_record_rests_for_100_ms_follows_the_arm_and_is_in_whole_steps_and_in_range() -> None:
+    lowering = moved(duration_s=0.7)
     time = record_times(lowering)
     speed = measure(lowering, Gyro(0.0, 0.0), 0.0, np.random.default_rng(1))
     assert time[0] == -0.1
@@ -165,9 +149,6 @@ def test_a_record_rests_for_100_ms_and_then_follows_the_arm(lowering: Trajectory
     assert not speed[:101].any()
     assert measure(lowering, Gyro(0.0, 0.0), 0.3, np.random.default_rng(1))[0] == 0.3
     assert np.allclose(speed[100:], np.degrees(lowering.states["speed"]), rtol=0, atol=1e-12)
-
-
-def test_the_record_is_in_whole_steps_and_in_range(lowering: Trajectory) -> None:
     speed = measure(lowering, Gyro(0.25, 0.5, range_deg_s=100.25), 0.0, np.random.default_rng(1))
     assert np.allclose(speed / 0.5, np.round(speed / 0.5), rtol=0, atol=1e-9)
     assert speed.max() == 100.0

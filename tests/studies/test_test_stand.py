@@ -55,15 +55,12 @@ def test_a_campaign_is_written_in_the_fixed_format(quick: Path) -> None:
     assert speeds(quick / "short.csv").shape == (301, 2)
 
 
-def test_a_campaign_says_synthetic_and_how_it_was_made(quick: Path) -> None:
+def test_a_campaign_says_synthetic_and_the_command_that_makes_it_again(quick, tmp_path, monkeypatch):
     heading = (quick / "campaign.toml").read_text().split("\nname")[0]
     for words in ("SYNTHETIC", "p0 = 3050000 Pa", "coulomb = 30", "0.25 deg/s rms, white", "default_rng: 3"):
         assert words in heading
         assert words in (quick / "README.md").read_text()
     assert str(quick.parent) not in heading
-
-
-def test_the_command_a_campaign_names_makes_it_again(quick: Path, tmp_path: Path, monkeypatch: Any) -> None:
     monkeypatch.chdir(tmp_path)
     line = (quick / "campaign.toml").read_text().splitlines()[1].removeprefix("# Made by: ")
     assert main(shlex.split(line)[2:]) == 0
@@ -106,12 +103,9 @@ EFFECTS_REFUSED = [
 ]
 
 
-def test_refuses_with_one_sentence_and_writes_nothing(refuses: Any) -> None:
+def test_refuses_with_one_sentence_and_writes_nothing_also_effects_that_mean_nothing(refuses: Any) -> None:
     for words, sentence in REFUSED:
         refuses(main, words, sentence)
-
-
-def test_refuses_effects_that_mean_nothing() -> None:
     for words, sentence in EFFECTS_REFUSED:
         with pytest.raises(RefusalError, match=sentence):
             read_effects(words)

@@ -35,19 +35,6 @@ def plugin(folder):
     return f"{folder / 'plant.py'}:boom"
 
 
-@pytest.fixture(scope="module")
-def identified(folder, plugin, tmp_path_factory):
-    """Return a function that identifies the campaign with some effects and returns the result."""
-
-    def run(effects):
-        out = tmp_path_factory.mktemp("boom")
-        words = ("--identifier", "least_squares", "--fitness", "rmse", "--budget", "600", "--effects", effects)
-        assert ended("identify", folder / "campaign", "--plugin", plugin, *words, "--out", out) == 0
-        return json.loads((out / "result.json").read_text())
-
-    return run
-
-
 @pytest.mark.slow
 def test_the_plant_keeps_the_contract(plugin):
     plant = load_registry([plugin]).plants["boom"]
@@ -67,11 +54,13 @@ def test_a_late_voltage_is_no_late_torque(folder, plugin):
     model = Model(boom) + EFFECTS["controller_delay"].in_form("voltage")
     space, rng = space_of(model, fixed=truth), np.random.default_rng(7)
     records = []
-    for replay in replays(read_campaign(folder / "campaign", {"boom": boom}).records, model, space):
+    every = read_campaign(folder / "campaign", {"boom": boom})
+    for replay in replays([*every.train, *every.holdout[:1]], model, space):
         signal = replay.signal(space.complete(np.empty((1, 0))))[0]
         signal = signal + replay.record.noise.rms * rng.standard_normal(signal.shape)
         records.append(replay.measuring(signal).record)
     campaign = replace(read_campaign(folder / "campaign", {"boom": torque_alone}), records=tuple(records))
+    campaign = campaign.with_window(0.0, 3.0)
     found = close_loop(Model(torque_alone), campaign, {n: EFFECTS[n] for n in ("controller_delay", "output_lag")})
     assert [s.effect for s in found.steps] == ["controller_delay"]
     inertia = found.after.estimates[0]
@@ -101,7 +90,13 @@ def test_what_is_read(folder, plugin):
 
 
 @pytest.mark.slow
-def test_the_right_effects_find_the_truth(identified):
+def test_the_right_effects_find_the_truth_and_without_them_the_answer_is_wrong(capsys, folder, plugin, tmp_path):
+    def identified(effects):
+        out = tmp_path / f"with {effects}"
+        words = ("--identifier", "least_squares", "--fitness", "rmse", "--budget", "600", "--effects", effects)
+        assert ended("identify", folder / "campaign", "--plugin", plugin, *words, "--out", out) == 0
+        return json.loads((out / "result.json").read_text())
+
     result = identified("load_friction,output_lag")
     for name, truth in TRUTH.items():
         found = result["parameters"][name]
@@ -109,10 +104,6 @@ def test_the_right_effects_find_the_truth(identified):
         assert found["high"] - found["low"] < 0.03 * truth
     assert result["error"]["holdout"]["chi2_per_sample"] == pytest.approx(1.0, abs=0.1)
     assert not any(p["bound_active"] for p in result["parameters"].values())
-
-
-@pytest.mark.slow
-def test_without_them_the_answer_is_wrong_and_says_so(identified, capsys):
     result = identified("")
     motor = result["parameters"]["motor_constant"]
     assert motor["low"] > 1.15 * TRUTH["motor_constant"]

@@ -1,6 +1,5 @@
 """A blind suite of three campaigns, and a study that closes the loop on them with few candidates."""
 
-import json
 from pathlib import Path
 
 from input_texts import SUITE_HEAD
@@ -34,9 +33,3 @@ def fake_campaigns(folder: Path, *names: str) -> None:
         (folder / name).mkdir(parents=True)
         (folder / name / "campaign.toml").write_text(f'name = "{name}"\n', encoding="utf-8")
         (folder / name / "lower.csv").write_text("time_s,angular_velocity_deg_s\n0,0\n", encoding="utf-8")
-
-
-def kept_reports(results) -> dict[str, str]:
-    """Return campaign -> its report as text, so that it can be compared bit for bit."""
-    loops = results.loops
-    return {case: json.dumps(report) for case, report in zip(loops["case"], loops["report"])}

@@ -68,11 +68,14 @@ def n_runs(out):
         return 0
 
 
-def test_a_cluster_that_is_not_there(write_study, tmp_path, monkeypatch):
+def test_a_cluster_that_is_not_there_or_goes_while_runs_are_made(write_study, tmp_path, monkeypatch):
     pytest.importorskip("distributed")
     monkeypatch.setattr("armid.study.pool.CONNECT_S", 0.5)
     with pytest.raises(ArmidError, match=r"the Dask cluster at tcp://127\.0\.0\.1:1 does not answer"):
         run_study(write_study(), dask="tcp://127.0.0.1:1", out=tmp_path / "out")
+    monkeypatch.setattr("armid.study.pool._connected", lambda address: Gone())
+    with pytest.raises(ArmidError, match="the Dask cluster at tcp://x:1 has gone: start again to go on"):
+        run_study(write_study(), dask="tcp://x:1", out=tmp_path / "out")
 
 
 class Gone:
@@ -91,9 +94,3 @@ class Gone:
 
     def close(self):
         pass
-
-
-def test_a_cluster_that_goes_while_runs_are_made(write_study, tmp_path, monkeypatch):
-    monkeypatch.setattr("armid.study.pool._connected", lambda address: Gone())
-    with pytest.raises(ArmidError, match="the Dask cluster at tcp://x:1 has gone: start again to go on"):
-        run_study(write_study(), dask="tcp://x:1", out=tmp_path / "out")

@@ -18,6 +18,8 @@ from armid.study.store import FILE_NAME
 
 SEEDS = 6
 N_RUNS = SEEDS * RUNS_A_SEED
+# What a process has of the environment but for the measure of coverage: who is killed tells none.
+UNMEASURED = {name: value for name, value in os.environ.items() if not name.startswith("COVERAGE")}
 
 
 def kept(out):
@@ -51,7 +53,7 @@ def killed_again_and_again(start, file, out, moments, rng):
     cut = 0
     for _ in range(moments):
         before = kept(out)
-        process = start(file, "--out", out, "--jobs", rng.choice((1, 2)), env=unmeasured())
+        process = start(file, "--out", out, "--jobs", rng.choice((1, 2)), env=UNMEASURED)
         if rng.random() < 0.8:
             wait_for(process, out, len(before))
             # a store can be read while it is written
@@ -65,11 +67,6 @@ def killed_again_and_again(start, file, out, moments, rng):
         assert {run: after[run] for run in before} == before
     assert f"{N_RUNS} of {N_RUNS} are in" in ended_well(start(file, "--out", out, "--jobs", 2))
     return cut
-
-
-def unmeasured():
-    """What a process has of the environment but for the measure of coverage: who is killed tells none."""
-    return {name: value for name, value in os.environ.items() if not name.startswith("COVERAGE")}
 
 
 @pytest.mark.slow

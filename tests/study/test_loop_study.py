@@ -28,14 +28,6 @@ def write(tmp_path):
     return study
 
 
-def test_a_run_for_each_campaign_and_no_word_of_the_key_in_it(write):
-    study = read_study(write("[suite]\nanything = [1, 2]\n"))
-    planned = list(study.plan())
-    assert [p.case for p in planned] == ["c000", "c001"]
-    assert len({p.run for p in planned}) == 2
-    assert not any("key" in p.settings for p in planned)
-
-
 def test_other_records_and_other_candidates_are_other_runs(write, tmp_path):
     before = {p.case: p.run for p in read_study(write()).plan()}
     assert before == {p.case: p.run for p in read_study(write("# a remark\n")).plan()}
@@ -77,41 +69,34 @@ def test_effects_of_a_sensor_are_looked_for_where_all_are(write):
     assert StudyRegistry().with_effects(arm, ["angle_bias"], "here").effects[0].name == "angle_bias"
 
 
-def test_all_effects_are_looked_for_unless_the_study_says_otherwise(write):
+def test_what_is_looked_for_in_which_campaigns_and_the_key_as_seen_from_the_store(write, tmp_path):
     text = re.sub(r"candidates = .*\n", "", STUDY)
     assert set(read_study(write(text=text)).candidates) == set(EFFECTS)
     assert set(read_study(write('without = ["tilt"]\n', text)).candidates) == set(EFFECTS) - {"tilt"}
-
-
-def test_a_key_is_told_as_seen_from_the_store(write, tmp_path):
-    told = read_study(write()).description(tmp_path / "results" / "blind")
-    assert told["key"] == "../../suite.key.json"
-    assert json.loads(json.dumps(told)) == told
-
-
-def test_rivals_are_looked_for_in_their_campaigns_alone(write):
     study = read_study(write('[rivals]\n"*0" = ["tilt"]\n'))
     assert study.candidates_for("c000") == ("tilt",)
     assert study.candidates_for("c001") == study.candidates
     assert ['"candidates":["tilt"]' in p.settings for p in study.plan()] == [True, False]
-
-
-def test_some_campaigns_only(write):
     assert read_study(write('only = ["*1"]\n')).case_names == ["c001"]
+    told = read_study(write()).description(tmp_path / "results" / "blind")
+    assert told["key"] == "../../suite.key.json"
+    assert json.loads(json.dumps(told)) == told
+    study = read_study(write("[suite]\nanything = [1, 2]\n"))
+    planned = list(study.plan())
+    assert [p.case for p in planned] == ["c000", "c001"]
+    assert len({p.run for p in planned}) == 2
+    assert not any("key" in p.settings for p in planned)
 
 
-@pytest.mark.parametrize(
-    ("more", "sentence"),
-    [
-        ('only = ["c002"]\n', "key 'only' holds 'c002', which is not a campaign of 'suite', did you mean 'c00"),
-        ('without = ["tillt"]\n', "effect 'tillt' is unknown, did you mean 'tilt'?"),
-        ('report = "blnd"\n', "report 'blnd' is unknown, did you mean 'blind'?"),
-        ('kind = "close_lop"\n', "kind 'close_lop' is unknown, did you mean 'close_loop'?"),
-        ("budget = 3\n", "key 'budget' is unknown"),
-        ('campaigns = "swite"\n', "there are no campaigns in 'swite', `make suite` makes them"),
-        ('campaigns = "."\n', "'.' holds no folder with a campaign.toml, `make suite` makes them"),
-    ],
-)
+@pytest.mark.parametrize(("more", "sentence"), [
+    ('only = ["c002"]\n', "key 'only' holds 'c002', which is not a campaign of 'suite', did you mean 'c00"),
+    ('without = ["tillt"]\n', "effect 'tillt' is unknown, did you mean 'tilt'?"),
+    ('report = "blnd"\n', "report 'blnd' is unknown, did you mean 'blind'?"),
+    ('kind = "close_lop"\n', "kind 'close_lop' is unknown, did you mean 'close_loop'?"),
+    ("budget = 3\n", "key 'budget' is unknown"),
+    ('campaigns = "swite"\n', "there are no campaigns in 'swite', `make suite` makes them"),
+    ('campaigns = "."\n', "'.' holds no folder with a campaign.toml, `make suite` makes them"),
+])  # fmt: skip
 def test_refuses_with_one_sentence(more, sentence, write, refused):
     name = more.partition(" ")[0]
     text = re.sub(rf"^{name} = .*\n", "", STUDY, flags=re.MULTILINE) + more

@@ -30,7 +30,7 @@ def replays_of(study, **wanted):
     return RunCache(study.registry, study.folder).replays(json.loads(planned.settings))[1]
 
 
-def test_every_combination_is_there_once_seed_by_seed(write_study):
+def test_every_combination_is_there_once_and_random_truths_are_a_latin_hypercube_inside_the_margin(write_study):
     planned = list(read_study(write_study(3)).plan())
     assert len({p.run for p in planned}) == len(planned) == 3 * RUNS_A_SEED
     study = read_study(write_study(3))
@@ -39,16 +39,28 @@ def test_every_combination_is_there_once_seed_by_seed(write_study):
     assert [p.seed for p in planned] == sorted(p.seed for p in planned)
     words = {(p.case, p.identifier, p.fitness, p.noise_deg_s, p.seed) for p in planned}
     assert len(words) == len(planned)
+    random_cases = RANDOM + FIRST_CASE
+    cases = read_study(write_study(1, change=(FIRST_CASE, random_cases))).cases[2:]
+    assert [c.name for c in cases[:2]] == ["random 01", "random 02"]
+    for name, (low, high) in cases[0].bounds.items():
+        shares = (np.array([c.truth[name] for c in cases]) - low) / (high - low)
+        assert sorted(((shares - 0.1) / 0.8 * 20).astype(int)) == list(range(20))
 
 
-def test_without_a_folder_results_go_where_git_ignores_them(write_study, tmp_path, monkeypatch):
+def test_without_a_folder_results_go_where_git_ignores_them_and_names_of_tables_choose_runs(
+    write_study, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     run_study(write_study(1), jobs=1, only="row 1/random")
     assert [path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*.sqlite")] == ["out/small/study.sqlite"]
     assert "out/" in (STUDIES.parent / ".gitignore").read_text().splitlines()
+    file = write_study(1, change=('fitness = ["rmse", "similarity"]', 'fitness = ["rmse", "mae"]'))
+    results = run_study(file, jobs=1, out=tmp_path / "out", only="row 1/pso on m*")
+    assert set(results.runs["fitness"]) == {"mae"}
+    assert set(results.runs["case"]) == {"row 1"}
 
 
-def test_noise_is_paired(write_study):
+def test_noise_is_paired_white_and_as_loud_as_told_and_a_window_shows_a_part_of_a_record(write_study):
     study = read_study(write_study(2))
     one = replays_of(study, case="row 1", identifier="random", noise_deg_s=0.3, seed=1)[0]
     for other in ({"identifier": "pso", "fitness": "similarity"}, {"identifier": "pso+least_squares"}):
@@ -56,9 +68,6 @@ def test_noise_is_paired(write_study):
         assert np.array_equal(one.measured, same.measured)
     again = replays_of(study, case="row 1", identifier="random", noise_deg_s=0.3, seed=2)[0]
     assert not np.any(one.measured == again.measured)
-
-
-def test_noise_is_white_and_of_the_level_that_the_likelihood_is_told(write_study):
     study = read_study(write_study(1, change=("noise_deg_s = [0.0, 0.3]", "noise_deg_s = [0.0, 0.3, 0.6]")))
     clean = replays_of(study, case="row 1", noise_deg_s=0.0)[0]
     for level in (0.3, 0.6):
@@ -69,9 +78,6 @@ def test_noise_is_white_and_of_the_level_that_the_likelihood_is_told(write_study
         assert abs(np.mean(noise**2) - 1.0) < 4.0 * np.sqrt(2.0 / n)
         assert abs(np.mean(noise)) < 4.0 / np.sqrt(n)
         assert abs(np.mean(noise[1:] * noise[:-1])) < 4.0 / np.sqrt(n)
-
-
-def test_a_window_shows_a_part_of_the_same_record(write_study):
     study = read_study(write_study(1, change=("[[0.0, 0.3]]", '[[0.05, 0.2], "whole"]')))
     part = replays_of(study, case="row 5", noise_deg_s=0.3, window="0.05-0.2 s")
     whole = replays_of(study, case="row 5", noise_deg_s=0.3, window="whole")
@@ -90,22 +96,6 @@ def test_simulated_records_agree_with_an_independent_integrator(stand, write_stu
     ours = clean_records(settings, study.cases[0].model)[0].measured
     # the file has six decimals
     assert np.abs(np.rad2deg(ours) - theirs).max() < 0.6e-6
-
-
-def test_random_truths_are_a_latin_hypercube_inside_the_margin(write_study):
-    random_cases = RANDOM + FIRST_CASE
-    cases = read_study(write_study(1, change=(FIRST_CASE, random_cases))).cases[2:]
-    assert [c.name for c in cases[:2]] == ["random 01", "random 02"]
-    for name, (low, high) in cases[0].bounds.items():
-        shares = (np.array([c.truth[name] for c in cases]) - low) / (high - low)
-        assert sorted(((shares - 0.1) / 0.8 * 20).astype(int)) == list(range(20))
-
-
-def test_some_runs_are_chosen_by_the_names_of_tables(write_study, tmp_path):
-    file = write_study(1, change=('fitness = ["rmse", "similarity"]', 'fitness = ["rmse", "mae"]'))
-    results = run_study(file, jobs=1, out=tmp_path / "out", only="row 1/pso on m*")
-    assert set(results.runs["fitness"]) == {"mae"}
-    assert set(results.runs["case"]) == {"row 1"}
 
 
 def test_a_changed_file_keeps_what_it_still_asks_for(write_study, tmp_path):

@@ -39,25 +39,23 @@ def test_what_is_missing_comes_in_order_and_once(store, monkeypatch):
     assert runs(store) == ["a1", "a2", "a3"]
 
 
-def test_a_second_process_is_refused_and_the_first_goes_on(store, tmp_path):
+def test_one_process_at_a_time_keeps_each_run_once_of_one_study_and_one_format(store, tmp_path):
     with pytest.raises(ArmidError, match="another process is at the runs of"):
         Store(tmp_path)
     assert store.save(Outcome("a0", DONE))
     assert len(load_study(tmp_path).runs) == 1
-
-
-def test_a_run_is_kept_once(store):
-    first, second = Outcome("a0", DONE, seconds=1.0), Outcome("a0", DONE, seconds=2.0)
+    first, second = Outcome("a1", DONE, seconds=1.0), Outcome("a1", DONE, seconds=2.0)
     assert store.save(first)
     assert not store.save(second)
-    assert store.counts() == (4, 1, 0)
-    assert load_study(store.path).runs["seconds"].tolist() == [1.0]
-
-
-def test_another_study_in_the_same_folder_is_refused(store):
+    assert store.counts() == (4, 2, 0)
+    assert load_study(store.path).runs["seconds"].tolist() == [0.0, 1.0]
     with pytest.raises(ArmidError, match="holds the study 'made', another folder is expected"):
         store.plan({"name": "other", "cases": []}, planned(1, "b"))
-    assert runs(store) == ["a0", "a1", "a2", "a3"]
+    assert runs(store) == ["a2", "a3"]
+    with closing(sqlite3.connect(tmp_path / FILE_NAME)) as connection:
+        connection.execute("PRAGMA user_version = 99")
+    with pytest.raises(ArmidError, match="is a store of format 99, 1 is expected"):
+        load_study(tmp_path)
 
 
 @pytest.mark.parametrize("content", [b"no database at all, but long enough to look like one" * 99, None])
@@ -73,13 +71,6 @@ def test_a_file_of_another_program_is_left_alone(tmp_path, content):
         with pytest.raises(ArmidError, match="is not a store of a study"):
             use(tmp_path)
     assert file.read_bytes() == before
-
-
-def test_a_store_of_another_format_is_told(store, tmp_path):
-    with closing(sqlite3.connect(tmp_path / FILE_NAME)) as connection:
-        connection.execute("PRAGMA user_version = 99")
-    with pytest.raises(ArmidError, match="is a store of format 99, 1 is expected"):
-        load_study(tmp_path)
 
 
 ENDLESS = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT"

@@ -56,13 +56,7 @@ def written(tmp_path):
     return write
 
 
-def test_budgets_for_each_parameter_need_no_other(written):
-    study = read_study(written(**{"budget = 100\n": ""}))
-    assert {run.budget for run in study.plan()} == {m * len(c.bounds) for c in study.cases for m in (5, 30)}
-    assert [entry.largest_budget for entry in study.entries] == [30, 30]
-
-
-def test_the_plan_has_each_problem_with_its_own_fitness_and_budgets_that_are_cut(written):
+def test_the_plan_has_each_problem_with_its_own_fitness_and_budgets_that_are_cut_or_for_each_parameter(written):
     study = read_study(written())
     planned = list(study.plan())
     assert study.case_names == [f"{name} {i}" for name in ("arm", "arm_shape", "arm_short") for i in (1, 2)]
@@ -73,6 +67,9 @@ def test_the_plan_has_each_problem_with_its_own_fitness_and_budgets_that_are_cut
         ("arm", "rmse"), ("arm_shape", "shape_similarity"), ("arm_short", "rmse")
     }  # fmt: skip
     assert "48 runs, 2,880 simulations at most in all" in study.cost()
+    study = read_study(written(**{"budget = 100\n": ""}))
+    assert {run.budget for run in study.plan()} == {m * len(c.bounds) for c in study.cases for m in (5, 30)}
+    assert [entry.largest_budget for entry in study.entries] == [30, 30]
 
 
 @pytest.mark.parametrize(("replaced", "sentence"), [
@@ -111,12 +108,9 @@ def test_a_report_in_words(written, tmp_path):
     assert len(results.runs) == 12
 
 
-def test_the_area_over_the_curve_by_hand():
+def test_the_area_over_the_curve_by_hand_and_where_curves_end():
     hits = np.array([[1.0, 10.0], [100.0, np.inf], [1.0, 1.0]])
     np.testing.assert_allclose(area_over_curve(hits, np.array([100.0, 100.0, 1000.0])), [0.75, 0.0, 1.0])
-
-
-def test_curves_end_where_the_budget_of_their_setting_does():
     groups = {"10 D": {"pso": np.array([0])}, "100 D": {"pso": np.array([1])}}
     hits = SimpleNamespace(value_hits=np.array([[1.0, 8.0], [1.0, 80.0]]))
     evidence = SimpleNamespace(groups=groups, colours={"pso": 0}, histories=hits, n_free=np.array([4, 4]),
@@ -171,24 +165,24 @@ def area_of(entry, options, cases, seed):
 def test_a_tuning_that_was_interrupted_ends_as_one_that_was_not(written, tmp_path, watched, capsys):
     pytest.importorskip("optuna")
     file, whole, broken = written(**SMALL), tmp_path / "whole", tmp_path / "broken"
-    command = ("tune", file, "--configurations", 4, "--jobs", 1)
+    command = ("tune", file, "--configurations", 3, "--jobs", 1)
     assert ended(*command, "--out", whole) == 0
     ran = capsys.readouterr()
-    assert "16 runs, 1,280 simulations at most in all" in ran.err
+    assert "12 runs, 960 simulations at most in all" in ran.err
     assert ran.out.startswith("of 2 identifiers ")
-    assert "16 of 16 are in " in ran.out
-    # to who watches the four rounds are one study
-    assert [(c.planned, c.done) for c in watched.started] == [(16, 0), (16, 4), (16, 8), (16, 12)]
+    assert "12 of 12 are in " in ran.out
+    # to who watches the three rounds are one study
+    assert [(c.planned, c.done) for c in watched.started] == [(12, 0), (12, 4), (12, 8)]
     made = set(watched.finished)
-    assert len(made) == len(watched.finished) == 16
+    assert len(made) == len(watched.finished) == 12
 
     watched.finished.clear()
     watched.handed.clear()
-    for watched.press_after in (6, 11):
+    for watched.press_after in (5, 9):
         assert ended(*command, "--out", broken, "--json") == 130
         assert json.loads(capsys.readouterr().out)["tuned"] == {}
         assert not (broken / "tuned.toml").exists()
-    assert 11 <= len(watched.finished) < 16
+    assert 9 <= len(watched.finished) < 12
     watched.press_after = 0
     assert ended(*command, "--out", broken, "--json") == 0
     given = json.loads(capsys.readouterr().out)
@@ -198,7 +192,7 @@ def test_a_tuning_that_was_interrupted_ends_as_one_that_was_not(written, tmp_pat
 
     tuned, first = read_study(broken / "tuned.toml"), training(read_study(file), 1)
     better = {entry.label.removesuffix(", tuned"): entry.options for entry in tuned.entries if entry.options}
-    assert better, "of four configurations none is better than the defaults"
+    assert better, "of three configurations none is better than the defaults"
     assert (tuned.name, len(tuned.entries)) == ("own_tuned", 2 + len(better))
     for entry in first.entries:
         areas, options = given["areas"][entry.label], better.get(entry.label, {})
@@ -275,14 +269,12 @@ def test_the_answer_of_a_tuning(written):
     assert said == "of 1 identifiers none is better tuned; nothing to tune in pso and cmaes"
 
 
-def test_tuning_refuses_identifiers_that_none_can_join(written):
-    rest = '[[identifiers]]\nname = "pso"\n[[identifiers]]\nname = "cmaes"\n'
-    study = read_study(written('identifiers = [{ name = "pso" }, { name = "cmaes" }]', **{rest: ""}))
-    with pytest.raises(ArmidError, match=r"in one line: tables headed \[\[identifiers\]\] are expected"):
-        training(study, 1)
-
-
-def test_tuning_refuses_what_it_would_be_tested_on(written):
+def test_tuning_takes_the_largest_budget_and_each_identifier_once_and_what_it_refuses(written):
+    study = read_study(written('fitness = "rmse"', **{'name = "cmaes"': 'name = "pso"\nfitness = "similarity"'}))
+    first = training(study, 7)
+    assert first.labels == ["pso"]
+    assert first.case_names == ["arm 3", "arm_shape 3", "arm_short 3"]
+    assert [(run.budget, run.seed) for run in first.plan()] == [(100, 7)] * 3
     with pytest.raises(ArmidError, match="arm 2 is in train and in instances"):
         training(read_study(written(**{"train = [3]": "train = [2]"})), 1)
     with pytest.raises(ArmidError, match=r"train is \[\], different ones"):
@@ -290,11 +282,7 @@ def test_tuning_refuses_what_it_would_be_tested_on(written):
     none = {'"pso"': '"random"', '"cmaes"': '"sobol"'}
     with pytest.raises(ArmidError, match="has nothing to tune, one of pso, pymoo_pso, "):
         training(read_study(written(**none)), 1)
-
-
-def test_tuning_takes_the_largest_budget_and_each_identifier_once(written):
-    study = read_study(written('fitness = "rmse"', **{'name = "cmaes"': 'name = "pso"\nfitness = "similarity"'}))
-    first = training(study, 7)
-    assert first.labels == ["pso"]
-    assert first.case_names == ["arm 3", "arm_shape 3", "arm_short 3"]
-    assert [(run.budget, run.seed) for run in first.plan()] == [(100, 7)] * 3
+    rest = '[[identifiers]]\nname = "pso"\n[[identifiers]]\nname = "cmaes"\n'
+    study = read_study(written('identifiers = [{ name = "pso" }, { name = "cmaes" }]', **{rest: ""}))
+    with pytest.raises(ArmidError, match=r"in one line: tables headed \[\[identifiers\]\] are expected"):
+        training(study, 1)
