@@ -238,7 +238,7 @@ LACKING = (
     "supply_sag=0.015", "gas_heat_loss=1", "controller_delay=0.01", "gyro_bandwidth_hz=30 gyro_bias_deg_s=3",
     "rocking_hz=5", "coulomb=80 supply_sag=0.015 tilt_deg=3 viscous=20",
 )  # fmt: skip
-SENSORS = ("--noise-deg-s 5", "--noise-bandwidth-hz 40 --noise-deg-s 1", "--quantisation-deg-s 2", "--rest 1.0",
+SENSORS = ("--noise-deg-s 5", "--noise-bandwidth-hz 40 --noise-deg-s 2", "--quantisation-deg-s 2", "--rest 1.0",
            "--repeats 1 --holdout  --manoeuvres inside_E", "--duration 0.4",
            "--noise-deg-s 0 --quantisation-deg-s 0")  # fmt: skip
 # Few records, of which no majority says which are right.

@@ -21,7 +21,7 @@ from armid.problem.problem import ReadyRecord
 from armid.problem.space import Space, space_of
 from armid.record import Campaign, Piece, Record
 from armid.record.campaign import scaled as scaled_plant
-from armid.record.sensor import FEWEST_INDEPENDENT, correlation_sum
+from armid.record.sensor import correlation_sum
 from armid.record.table import POSITIONS
 from armid.units import shown
 
@@ -63,8 +63,9 @@ LONGEST_INTERVAL = 1.0
 FIRST_SAMPLES, ELSEWHERE, FAR_OF_MOTION = 3, 10.0, 0.02
 # Successive samples, of so many values, that two recordings do not have in common by chance.
 ALIKE_VALUES, DIFFERENT = 40, 10
-# Rest that scatters by this share of the motion's rms in fewer independent samples, or has this mean, is not a rest.
-RESTLESS, LARGE_MEAN = 0.02, 0.2
+# Rest that scatters by this share of the motion's rms in so few independent samples, or has this mean, is not a rest. A
+# ramp has 3, noise of 20 Hz in a rest of 0.1 s has 4.4 and more.
+RESTLESS, OF_A_RAMP, LARGE_MEAN = 0.02, 4.0, 0.2
 
 
 def data_issues(campaign: Campaign, model: Model, space: Space) -> tuple[DataIssue, ...]:
@@ -455,7 +456,7 @@ def noise_or_rest(record: Record) -> Iterator[DataIssue]:
         return
     scatter, mean = float(np.std(rest)) / rms(x), abs(float(np.mean(rest))) / rms(x)
     independent = rest.size / (1.0 + 2.0 * correlation_sum(rest - np.mean(rest)))
-    if mean > LARGE_MEAN or (scatter > RESTLESS and independent < FEWEST_INDEPENDENT):
+    if mean > LARGE_MEAN or (scatter > RESTLESS and independent < OF_A_RAMP):
         yield DataIssue("rest", record.file, f"{record.file}: the machine is not at rest before t = 0, its speed has a "
                         f"mean of {mean:.2g} and scatters by {scatter:.2g} of the motion's rms there: samples at rest, "
                         "or a clock that begins with the motion, are expected.")  # fmt: skip
