@@ -7,7 +7,9 @@ parameter changes all rates and outputs as the effect does. Other effects act me
 like another mass only until something else acts.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -26,9 +28,45 @@ from armid.model.graph import LATE_LEAVES
 # act (measured on nine machines).
 SAME_LAW, SAME_IN_COMPANY = 1e-3, 0.01
 # States at which laws are compared, and by which share of their range they leave that of the records to either side.
-N_STATES, FARTHER = 2000, 0.5
+N_STATES, FARTHER = 1000, 0.5
 # Share of their size with which other effects act, and of its size or value by which each parameter is changed.
 COMPANY, CHANGED = 0.1, 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class States:
+    """Hold states at which the equations of a model are evaluated: key of a leaf -> one value, or one of each state."""
+
+    model: Model
+    values: Mapping[str, Any]
+
+    @cached_property
+    def rates(self) -> dict[str, Array]:
+        """Rates of all states, and the outputs."""
+        graph = self.model.graph
+        keys = [n.key for n in graph.of_kind("rate")] + [o.signal for o in self.model.plant.outputs]
+        with np.errstate(all="ignore"):
+            values = graph.values(keys, self.values)
+        return {key: np.broadcast_to(values[key], N_STATES) for key in keys}
+
+    def moved(self, changes: Mapping[str, float]) -> "States":
+        """Return the same states with other parameters or constants; changes: name -> what is added."""
+        return replace(self, values={**self.values, **{flat(n): self.values[flat(n)] + x for n, x in changes.items()}})
+
+    def change(self, name: str, size: float) -> Array:
+        """Return the change of rates and outputs per change of a parameter or constant, (n, n_states).
+
+        Each over how much it varies from state to state.
+        """
+        after, rows = self.moved({name: CHANGED * size}).rates, []
+        for key, before in self.rates.items():
+            spread = float(np.nanstd(before))
+            rows.append((after[key] - before) / (spread or 1.0))
+        return np.array(rows)
+
+    def changes(self, own: Iterable[str]) -> dict[str, Array]:
+        """Return the change by each of some parameters and constants."""
+        return {n: self.change(n, self.values[flat(n)] or 1.0) for n in own}
 
 
 def doubles(fit: Fit, library: Library) -> dict[EffectKey, str]:
@@ -37,33 +75,41 @@ def doubles(fit: Fit, library: Library) -> dict[EffectKey, str]:
     fit: of the declared model. Constants are those that are known within a tolerance.
     """
     own = [*fit.values, *(p.names[0] for p in fit.products(library.tolerances))]
-    known: dict[int, dict[str, Any]] = {}
+    known: dict[int, tuple[States, dict[str, Array]]] = {}
     found: dict[EffectKey, str] = {}
     for key in library.joinable(()):
         records = beside(fit, (key,), library)
         if id(records.model) not in known:
-            known[id(records.model)] = scattered(records, candidate_at(records, fit.values))
-        name = double(records, key, own, known[id(records.model)], library)
+            states = scattered(records, candidate_at(records, fit.values))
+            known[id(records.model)] = states, states.changes(own)
+        name = double(records, key, *known[id(records.model)], library)
         found |= {key: name} if name else {}
     return found
 
 
-def double(records: WhiteRecords, key: EffectKey, own: Sequence[str], values: dict[str, Any], library: Library) -> str:
-    """Return which parameter or constant is the law of an effect, "" for none."""
-    model, all_strengths = records.model, strengths(records, library)
-    names, shares = all_strengths.get(key, []), dict.fromkeys(own, 0.0)
+def double(
+    records: WhiteRecords, key: EffectKey, alone: States, own: Mapping[str, Array], library: Library
+) -> str:  # fmt: skip
+    """Return which parameter or constant is the law of an effect, "" for none.
+
+    alone: no effect acts there. own: change by each parameter and constant there.
+    """
+    declared, all_strengths = records.model.parameters, strengths(records, library)
+    names = all_strengths.get(key, [])
     if len(names) != 1:
         return ""
-    ports = library.candidates[key].adds.keys()
-    company = {n: library.strength_of(n, model.parameters[n]) for other, theirs in all_strengths.items()
+    size, ports = library.strength_of(names[0], declared[names[0]]), library.candidates[key].adds.keys()
+    change = alone.change(names[0], size)
+    same = [n for n, other in own.items() if apart(change, other) < SAME_LAW]
+    if not same:
+        return ""
+    company = {n: COMPANY * library.strength_of(n, declared[n]) for other, theirs in all_strengths.items()
                if not ports & library.candidates[other].adds.keys() for n in theirs}  # fmt: skip
-    size = library.strength_of(names[0], model.parameters[names[0]])
-    for share, most in ((0.0, SAME_LAW), (COMPANY, SAME_IN_COMPANY)):
-        here = values | {flat(n): values[flat(n)] + share * strength for n, strength in company.items()}
-        change = change_of(model, here, names[0], size)
-        shares = {n: apart(change, change_of(model, here, n, here[flat(n)] or 1.0)) for n in shares}
-        shares = {n: x for n, x in shares.items() if x < most}
-    return min(shares, key=lambda n: shares[n], default="")
+    acting = alone.moved(company)
+    change = acting.change(names[0], size)
+    shares = {n: apart(change, other) for n, other in acting.changes(same).items()}
+    name = min(shares, key=lambda n: shares[n])
+    return name if shares[name] < SAME_IN_COMPANY else ""
 
 
 def strengths(records: WhiteRecords, library: Library) -> dict[EffectKey, list[str]]:
@@ -78,8 +124,8 @@ def strengths(records: WhiteRecords, library: Library) -> dict[EffectKey, list[s
             if all(declared[n].unit != "s" for n in names)}  # fmt: skip
 
 
-def scattered(records: WhiteRecords, candidate: Array) -> dict[str, Any]:
-    """Return what the equations of a model begin from: a candidate, and states and inputs independent of each other.
+def scattered(records: WhiteRecords, candidate: Array) -> States:
+    """Return a candidate with states and inputs that are independent of each other.
 
     Each is even over the range that it has on the records, and beyond.
     """
@@ -103,24 +149,8 @@ def scattered(records: WhiteRecords, candidate: Array) -> dict[str, Any]:
         return rng.uniform(low - beyond, high + beyond, N_STATES)
 
     values |= {name: drawn(name) for name in seen}
-    return values | {node.key: drawn(node.needs[0]) for node in model.graph.of_kind(*LATE_LEAVES)}
-
-
-def change_of(model: Model, values: Mapping[str, Any], name: str, size: float) -> Array:
-    """Return the change of all rates and outputs per change of one parameter or constant, (n, n_states).
-
-    Each over how much it varies from state to state.
-    """
-    keys = [n.key for n in model.graph.of_kind("rate")] + [o.signal for o in model.plant.outputs]
-    changed, rows = dict(values), []
-    with np.errstate(all="ignore"):
-        before = model.graph.values(keys, values)
-        changed[flat(name)] = values[flat(name)] + CHANGED * size
-        after = model.graph.values(keys, changed)
-        for key in keys:
-            spread = float(np.nanstd(before[key]))
-            rows.append(np.broadcast_to((after[key] - before[key]) / (spread or 1.0), N_STATES))
-    return np.array(rows)
+    values |= {node.key: drawn(node.needs[0]) for node in model.graph.of_kind(*LATE_LEAVES)}
+    return States(model, values)
 
 
 def apart(one: Array, other: Array) -> float:

@@ -262,12 +262,23 @@ def next_model(exploration: Exploration) -> Hypotheses | None:
     """
     ranked = exploration.ranked()
     best, top = ranked[0]
-    near = [m for m, value in ranked if value > top - WINDOW and not is_outdone(m, value, ranked)]
+    expanded = [(m, value) for m, value in ranked if m in exploration.forecasts]
+    near = [m for m, value in ranked if value > top - WINDOW
+            and not (is_outdone(m, value, ranked) or has_twin(m, value, expanded))]  # fmt: skip
     if is_significant(exploration.fits[best]) and exploration.fits[best].records.data.cover is None:
         plain = [m for m, _ in ranked if all(h.kind == "effect" for h in m)]
         beam = [m for n in range(1, len(best) + 1) for m in [m for m in plain if len(m) == n][:BEAM]]
         near = [*near, *beam] if is_near(exploration) else [*beam, *near]
     return next((m for m in near if m not in exploration.forecasts and len(m) < MOST_EFFECTS), None)
+
+
+def has_twin(model: Hypotheses, value: float, expanded: Sequence[tuple[Hypotheses, float]]) -> bool:
+    """Tell whether a model of the same names in other forms that may be right was expanded: it has the same neighbours.
+
+    The model at which the search ends is expanded all the same.
+    """
+    names = {h.public for h in model}
+    return any(m != model and {h.public for h in m} == names and other > value - WINDOW for m, other in expanded)
 
 
 def is_outdone(model: Hypotheses, value: float, ranked: Sequence[tuple[Hypotheses, float]]) -> bool:
