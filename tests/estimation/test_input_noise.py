@@ -253,3 +253,28 @@ def test_inputs_count_as_exact_where_the_records_are_more_probable_so(tmp_path):
     assert "taking the measured inputs as measured with noise" in steps
     assert found.inference.exploration.library.as_read is None
     assert found.effects == ("viscous",)
+
+
+@pytest.mark.slow
+def test_inputs_count_as_exact_where_a_constant_is_off_as_well(tmp_path):
+    """Held at its declared value it would leave more than noise, for which the input would be blamed."""
+
+    def computed(seed):
+        return torque(seed + 200) + np.random.default_rng(seed + 200).normal(0.0, TORQUE_NOISE, len(TIMES))
+
+    toml = 'name = "axis"\nplant = "driven_axis"\nhold = "zero"\neffects = ["viscous"]\n[constants]\ngain = 0.94\n'
+    toml += f"[tolerances]\ngain = 0.03\n[parameters]\nmass = {{ fixed = {INERTIA} }}\n"
+    tables, rng = {}, np.random.default_rng(5)
+    for i in range(3):
+        drive = computed(i)
+        seen = speed(drive) + rng.normal(0.0, SPEED_NOISE, len(TIMES))
+        tables[f"r{i}.csv"] = {"time_s": TIMES, "drive_N": drive, "velocity_m_s": seen}
+    records = read_campaign(write_records(tmp_path / "axis", toml, tables))
+    records = replace(records, records=tuple(replace(r, input_noise={"u": InputNoise(rms=TORQUE_NOISE)})
+                                             for r in records.records))  # fmt: skip
+    steps = []
+    found = close_loop(records, candidates=["coulomb"], told=steps.append)
+    assert "taking the measured inputs as measured with noise" in steps
+    assert found.inference.exploration.library.as_read is None
+    assert (found.verdict, found.steps) == ("no_discrepancy", ())
+    assert found.inference.best.deviations["gain"] == pytest.approx(0.06 / 0.94 / 0.03, abs=0.2)

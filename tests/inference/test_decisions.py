@@ -15,7 +15,7 @@ NUMERICS = {
     "rounding": ("DEPENDENT", "NEGLIGIBLE", "ROUNDING_OF_SIGNAL", "ROUGHLY", "LEAST_CHANCE"),
     "whether differences tell a slope": ("BELIEVED", "LEAST_RISE", "BENT_RISE", "FOLLOWED"),
     "convergence of fits and of the engine": ("SETTLED_COST", "NEAR_NOISE", "FEWEST_SPARED", "FURTHER_ERROR",
-                                              "WIDE", "FORETOLD"),
+                                              "WIDE", "FORETOLD", "UNTOLD"),
     "budgets of computing": ("FEWEST_IN_BUNDLES", "MOST_IN_VAIN", "MOST_EFFECTS", "MOST_OF_SIZE", "MOST_RIVALS",
                              "FEWEST_OF_PART"),
     "estimate of the noise": ("FEWEST_FOR_COLOUR", "FEWEST_ORDINATES", "MOST_LAGS_OF_NOISE", "LINE_OF_MAINS",

@@ -186,7 +186,9 @@ def test_a_fit_from_a_nearer_start_takes_the_place_of_a_local_one_and_its_eviden
     found = Exploration(None, {})
     key = model("ab")
     assert found.take(key, local)
+    found.forecasts[key] = []
     assert found.take(key, better)
+    assert key not in found.forecasts, "they were made about a worse fit"
     assert not found.take(key, local)
     assert not found.take(key, None)
     assert not found.take(key, Mock(chi2=np.nan))

@@ -27,6 +27,7 @@ from armid.inference.model import ROUGHLY, Fit, accurate, fit_from, start_of
 from armid.inference.posterior import CONSTANTS_TEXT, Posterior, posterior, spread
 from armid.inference.same_law import doubles
 from armid.inference.search import Exploration, explore, without_denied
+from armid.inference.unknowns import freed
 from armid.inference.whitening import WhiteRecords, whitened, with_answers
 from armid.model import EFFECTS, Array, Effect, Model
 from armid.model.effects.sensor import sensor_effects
@@ -300,28 +301,54 @@ def infer(library: Library, declared: Fit) -> Inference:
     with a prior. Models are explored in Occam's window; `evidence` says how a model gets its probability.
     """
     inference = inferred(library, declared)
-    shown = with_noise_in_motion(library, inference)
-    if shown is not library:
-        library, declared = with_input_noise(shown, declared_again(shown, declared))
-        inference = inferred(library, declared)
-    if not pooled_noise(library.data.records):
+    # First, as inputs that are taken for noisy look like noise in motion.
+    exact = with_exact_inputs(library, inference)
+    if exact is not library:
+        declared = declared_again(exact, declared)
+        inference = inferred(exact, declared)
+    shown = with_noise_in_motion(exact, inference)
+    if shown is not exact:
+        again = declared_again(shown, declared)
+        shown, declared = (shown, again) if exact is not library else with_input_noise(shown, again)
+        inference = inferred(shown, declared)
+    if exact is not library or not pooled_noise(shown.data.records):
         return inference
-    exact = library
-    if library.as_read is not None:
-        fit, exact = inference.exploration.fits[inference.named[0]], library.with_data(library.as_read)
-        problem = exact.problem(fit.active, fit.values)
-        again = accurate(fit_from(problem, fit.active, [start_of(problem, fit.values)]), exact)
-        if again.log_density > fit.log_density:
-            library.say("the inputs count as exact: the records are more probable so")
-            return inferred(exact, declared_again(exact, declared))
+    exact = with_exact_inputs(shown, inference)
+    if exact is not shown:
+        return inferred(exact, declared_again(exact, declared))
     fit = inference.exploration.fits[inference.in_force]
     if fit.active and inference.posterior.probability("unknown") >= MENTIONED:
         # the declared model may answer to its inputs quite otherwise
-        answering = with_measured_inputs(exact, fit)
+        answering = with_measured_inputs(as_exact(shown), fit)
         if may_be_all(answering, fit):
-            library.say("the same with the noise of the inputs as the best model answers to it")
+            shown.say("the same with the noise of the inputs as the best model answers to it")
             return inferred(answering, declared_again(answering, declared))
     return inference
+
+
+def as_exact(library: Library) -> Library:
+    """Return a library whose inputs count as exact."""
+    return library if library.as_read is None else library.with_data(library.as_read)
+
+
+def with_exact_inputs(library: Library, inference: Inference) -> Library:
+    """Return the library with its inputs as they were read, where they count as noisy and records deny that.
+
+    A controller that computes its output from a noisy speed makes a column that looks like a noisy one. Constants and
+    faults are free in both.
+    """
+    exact = as_exact(library)
+    if exact is library:
+        return library
+    fit = inference.exploration.fits[inference.named[0]]
+    problem = exact.problem(fit.active, fit.values)
+    again = accurate(fit_from(problem, fit.active, [start_of(problem, fit.values)]), exact)
+    if fit.others:
+        again = freed(again, again.records, [f.unknown for f in fit.others], inference.exploration.scale().weight)
+    if again.log_density <= fit.log_density:
+        return library
+    library.say("the inputs count as exact: the records are more probable so")
+    return exact
 
 
 def may_be_all(library: Library, fit: Fit) -> bool:

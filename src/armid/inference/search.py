@@ -29,7 +29,7 @@ from armid.inference.evidence import (
 from armid.inference.hypothesis import Hypotheses, Hypothesis, Proposal, log_prior, words
 from armid.inference.kinds import drifts, effects, faults, unknown
 from armid.inference.library import Library
-from armid.inference.model import Fit, finished, fit_from, start_of, unless_diverged, with_free_shapes
+from armid.inference.model import UNTOLD, Fit, finished, fit_from, start_of, unless_diverged, with_free_shapes
 from armid.inference.model import freed as freed_shape
 from armid.inference.shooting import on_short_pieces, on_whole_records
 from armid.inference.unknowns import Unknown, constants_of, freed, polished, projected
@@ -68,8 +68,9 @@ class Exploration:
 
     fits: by the hypotheses that hold in it. forecasts: of each model that was expanded. noise: the scale,
     None: as the model shows it that leaves least. completed: models at their estimates with all unknowns freed, and the
-    weight of a square at which they were. refused: models that diverge, are hopeless, or hold a fault that hardly moves
-    its record. in_vain: models that were expanded in turn without a better one, far from the noise.
+    weight of a square at which they were. n_expanded: how often a model was expanded. refused: models that diverge, are
+    hopeless, or hold a fault that hardly moves its record. in_vain: models that were expanded in turn without a better
+    one, far from the noise.
     """
 
     library: Library
@@ -81,6 +82,7 @@ class Exploration:
     forecasts: dict[Hypotheses, list[Forecast]] = field(default_factory=dict)
     noise: Scale | None = None
     completed: dict[Hypotheses, float] = field(default_factory=dict)
+    n_expanded: int = 0
     refused: set[Hypotheses] = field(default_factory=set)
     in_vain: int = 0
     _evidence: WeakKeyDictionary[Fit, dict[Scale, float]] = field(default_factory=WeakKeyDictionary)
@@ -114,15 +116,21 @@ class Exploration:
         return sorted(ranking, key=lambda pair: -pair[1])
 
     def take(self, model: Hypotheses, fit: Fit | None) -> bool:
-        """Keep a fit where it is better than the one that is known; tell whether it is."""
+        """Keep a fit where it is better than the one that is known; tell whether it is.
+
+        What was forecast about a worse fit, whose misfit asked for other hypotheses, is forgotten.
+        """
         if fit is None or not np.isfinite(fit.chi2):
             return False
         known = self.fits.get(model)
         if known is not None:
             scale = self.scale()
-            again = log_evidence(expansion_of(fit, scale, self.library)) + log_prior(model)
-            if self.log_posterior(model, scale) >= again:
+            rise = log_evidence(expansion_of(fit, scale, self.library)) + log_prior(model)
+            rise -= self.log_posterior(model, scale)
+            if not rise > 0.0:
                 return False
+            if rise > UNTOLD:
+                self.forecasts.pop(model, None)
         self.fits[model] = fit
         self.completed.pop(model, None)
         return True
@@ -174,7 +182,7 @@ def expand_all(exploration: Exploration, most: int | None) -> bool:
     """
     cost = len(exploration.declared.residual) / SAMPLES * (1.0 + len(exploration.constants) / USUAL_CONSTANTS)
     most = most or int(np.clip(MOST_EXPANDED / cost, FEWEST_EXPANDED, MOST_EXPANDED))
-    while len(exploration.forecasts) < most and exploration.in_vain < MOST_IN_VAIN:
+    while exploration.n_expanded < most and exploration.in_vain < MOST_IN_VAIN:
         model, best = next_model(exploration), exploration.ranked()[0][0]
         if model is None:
             return True
@@ -309,6 +317,7 @@ def expand(exploration: Exploration, model: Hypotheses) -> None:
     ahead_held = [forecast(held, p) for p in proposals]
     beside = [forecast(about, p) for p in others]
     exploration.forecasts[model] = [f.without_columns for f in (*ahead, *beside)]
+    exploration.n_expanded += 1
     limit = limit_of(exploration, scale)
     trials: list[Trial] = []
     if is_significant(fit):
