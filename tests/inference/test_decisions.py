@@ -12,7 +12,7 @@ FILES = sorted([*(SRC / "loop").glob("*.py"), *(SRC / "inference").rglob("*.py")
 MOST = 20
 # Constants that are compared with and decide nothing that a user is told, by what they are.
 NUMERICS = {
-    "rounding": ("DEPENDENT", "NEGLIGIBLE", "ROUNDING_OF_SIGNAL", "ROUGHLY", "LEAST_CHANCE"),
+    "rounding": ("DEPENDENT", "NEGLIGIBLE", "ROUNDING_OF_SIGNAL", "ROUNDING_OF_LAW", "ROUGHLY", "LEAST_CHANCE"),
     "whether differences tell a slope": ("BELIEVED", "LEAST_RISE", "BENT_RISE", "FOLLOWED"),
     "convergence of fits and of the engine": ("SETTLED_COST", "NEAR_NOISE", "FEWEST_SPARED", "FURTHER_ERROR",
                                               "WIDE", "FORETOLD", "UNTOLD"),

@@ -8,7 +8,9 @@ import pytest
 import armid
 from armid.estimation.information import start_changes
 from armid.inference import prepared
+from armid.inference.candidates import EffectKey
 from armid.inference.checks import holdout_residuals
+from armid.inference.kinds.effects import hypotheses
 from armid.inference.model import unless_diverged
 from armid.inference.whitening import WhiteRecords, whitened
 from armid.loop import close_loop
@@ -106,7 +108,7 @@ def test_force_mass_and_friction_that_grow_alike_are_not_told_apart_by_sharp_fri
         assert estimate.low < truth < estimate.high
 
 
-def test_dry_friction_of_the_machine_is_not_looked_for_in_another_form(tmp_path):
+def test_dry_friction_of_the_machine_is_not_looked_for_and_improbable_in_another_form(tmp_path):
     """Two smoothed signs are one friction, but an offset or presliding is another law."""
     rng, toml = np.random.default_rng(3), 'name = "axis"\nplant = "driven_axis"\nhold = "zero"\n'
     records = {f"r{i}.csv": table for i, table in enumerate(tables(rng))}
@@ -119,5 +121,8 @@ def test_dry_friction_of_the_machine_is_not_looked_for_in_another_form(tmp_path)
     declared = read_campaign(write_records(tmp_path / "declared", toml, records, holdout=0))
     candidates = {n: EFFECTS[n] for n in ("coulomb", "viscous", "torque_offset", "presliding", "drive_gain")}
     library, _ = prepared(Model(declared.plant) + own, declared, candidates)
-    assert {key.public: name for key, name in library.left_out.items()} == {"coulomb": "bearing.level"}
-    assert {key.form for key in library.left_out} == {"", "tanh"}
+    assert {(k.public, k.form): (d.name, d.exactly) for k, d in library.doubles.items()} == {
+        ("coulomb", ""): ("bearing.level", False), ("coulomb", "tanh"): ("bearing.level", True)}  # fmt: skip
+    assert library.left_out == {EffectKey("coulomb", "tanh"): "bearing.level"}
+    priors = {(k.public, k.form): h.log_prior for k, h in hypotheses(library).items()}
+    assert priors["coulomb", ""] < priors["presliding", ""]

@@ -304,7 +304,7 @@ def test_records_that_look_wrong_are_told_and_nothing_is_looked_for(axis, monkey
     assert conclusion(found) == "Nothing is named, as the records look wrong. The drive has the other sign."
 
 
-def concluded(verdict, effects=(), claimed=(), alternatives=(), moved=0.0, shows_on_train=False):
+def concluded(verdict, effects=(), claimed=(), alternatives=(), moved=0.0, shows_on_train=False, ratios=()):
     """Return what is said first of a loop that ended with a verdict and left more than noise."""
     steps = [
         SimpleNamespace(effect=e, claimed=e in claimed, alternatives=alternatives, probability=0.6) for e in effects
@@ -312,7 +312,10 @@ def concluded(verdict, effects=(), claimed=(), alternatives=(), moved=0.0, shows
     return conclusion(SimpleNamespace(
         verdict=verdict, effects=effects, steps=steps,
         outputs={"speed": {"noise_rms": 0.1, "moved_by_inputs": moved}},
-        after=SimpleNamespace(significant=True, diagnosis=SimpleNamespace(significant=shows_on_train, p=0.002),
+        after=SimpleNamespace(significant=True,
+                              diagnosis=SimpleNamespace(
+                                  significant=shows_on_train, p=0.002, of_kind=lambda _: [
+                                      SimpleNamespace(where=w, ratio=r) for w, r in ratios]),
                               train=SimpleNamespace(errors=SimpleNamespace(rmse=0.45))),
         campaign=SimpleNamespace(holdout=()),
     ))  # fmt: skip
@@ -329,6 +332,11 @@ def test_a_conclusion_is_what_the_tests_say():
     assert concluded("partly_explained", ("a", "b"), "a").endswith(f"{predicts}: b is not claimed.")
     assert concluded("partly_explained", ("a", "b"), "ab").endswith(f"{predicts}.")
     assert concluded("unexplained") == "The declared model lacks something that the library does not hold."
+    ratios = [("a.csv, speed", 60.0), ("b.csv, speed", 1.5), ("c.csv, speed", 0.9), ("a.csv, angle", 40.0)]
+    where = "99% of what the model leaves beyond noise lies in a.csv: look at this record first."
+    assert concluded("unexplained", ratios=ratios).endswith(where)
+    assert "a.csv" not in concluded("unexplained", ratios=[*ratios, ("c.csv, angle", 30.0)])
+    assert "a.csv" not in concluded("unexplained", ratios=ratios[:2])
     assert concluded("unexplained", moved=0.4).endswith("noise of the inputs may be all of it.")
     group = concluded("cannot_tell_apart", ("a", "b"), "a", ("c", "d"))
     assert group.startswith("With a + b a significant discrepancy remains, and on these records")

@@ -48,6 +48,14 @@ class EffectKey:
 Active = tuple[EffectKey, ...]
 
 
+@dataclass(frozen=True)
+class Double:
+    """Say which parameter or constant of the declared model is the law of an effect; exactly: in the same form."""
+
+    name: str
+    exactly: bool
+
+
 def declared_keys(active: Iterable[EffectKey]) -> set[EffectKey]:
     """Return the effects of a model, whether or not their shapes are free."""
     return {key.declared for key in active}

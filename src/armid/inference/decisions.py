@@ -42,7 +42,8 @@ AS_WELL = 1.0 - CLAIMED
 NOT_CARRIED = 2.0
 # Share of the trained range by which a held-out record leaves it where this is reported as new.
 OUTSIDE = 0.1
-# Share of the squared error of a held-out record that one changed parameter takes away where it is named.
+# Share of the squared error of a held-out record that one changed parameter takes away where it is named, and of all
+# that is left beyond noise that lies in one record.
 EXPLAINS = 0.9
 
 

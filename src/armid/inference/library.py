@@ -22,6 +22,7 @@ from armid.inference.candidates import (
     ERROR_OF,
     PROBE,
     Active,
+    Double,
     EffectKey,
     bump_at,
     bundled,
@@ -54,8 +55,8 @@ class Library:
     long. priors: probabilities of effects before the records. known: mean and deviation of parameters, SI, likewise.
     as_read: the data whose inputs count as exact, where in `data` they count as measured with noise, else None.
     reach: by which factor strengths that scale with the machine may exceed their declared range. widened: ranges of
-    strengths of the declared model that were too narrow. doubles: effects that do what a free parameter of the declared
-    model does, or a constant within its tolerance, and its name.
+    strengths of the declared model that were too narrow. doubles: effects that are the law of a free parameter of the
+    declared model, or of a constant within its tolerance.
     """
 
     declared: Model
@@ -74,7 +75,7 @@ class Library:
     as_read: WhitenedData | None = None
     reach: float = 1.0
     widened: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    doubles: Mapping[EffectKey, str] = field(default_factory=dict)
+    doubles: Mapping[EffectKey, Double] = field(default_factory=dict)
     _models: dict[Active, Model] = field(default_factory=dict)
     _problems: dict[frozenset[EffectKey], WhiteRecords] = field(default_factory=dict)
     _schedules: dict[EffectKey, "Schedules"] = field(default_factory=dict)
@@ -86,7 +87,7 @@ class Library:
     @cached_property
     def left_out(self) -> dict[EffectKey, str]:
         """The effects that a free parameter does already, which are not tried, and its name."""
-        return {key: name for key, name in self.doubles.items() if name not in self.tolerances}
+        return {key: one.name for key, one in self.doubles.items() if one.exactly and one.name not in self.tolerances}
 
     def owner(self, parameter: str) -> EffectKey | None:
         """Return the candidate to which a parameter of a compiled model belongs, None for the declared model's own."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from armid.engine import simulate
 from armid.engine.simulate import flat
-from armid.inference.candidates import EffectKey
+from armid.inference.candidates import Double, EffectKey
 from armid.inference.kinds.effects import beside
 from armid.inference.library import Library
 from armid.inference.model import Fit, candidate_at
@@ -26,7 +26,7 @@ from armid.model.graph import LATE_LEAVES
 
 # Two forms of one law differ by up to 4e-4 of their square, two laws by 2e-3 and more, and by 0.05 where other effects
 # act (measured on nine machines).
-SAME_LAW, SAME_IN_COMPANY = 1e-3, 0.01
+ROUNDING_OF_LAW, SAME_LAW, SAME_IN_COMPANY = 1e-9, 1e-3, 0.01
 # States at which laws are compared, and by which share of their range they leave that of the records to either side.
 N_STATES, FARTHER = 1000, 0.5
 # Share of their size with which other effects act, and of its size or value by which each parameter is changed.
@@ -69,47 +69,47 @@ class States:
         return {n: self.change(n, self.values[flat(n)] or 1.0) for n in own}
 
 
-def doubles(fit: Fit, library: Library) -> dict[EffectKey, str]:
-    """Return the effects of one strength that are a free parameter of the declared model, or a constant, and its name.
+def doubles(fit: Fit, library: Library) -> dict[EffectKey, Double]:
+    """Return the effects of one strength that are a free parameter of the declared model, or a constant.
 
     fit: of the declared model. Constants are those that are known within a tolerance.
     """
     own = [*fit.values, *(p.names[0] for p in fit.products(library.tolerances))]
     known: dict[int, tuple[States, dict[str, Array]]] = {}
-    found: dict[EffectKey, str] = {}
+    found: dict[EffectKey, Double] = {}
     for key in library.joinable(()):
         records = beside(fit, (key,), library)
         if id(records.model) not in known:
             states = scattered(records, candidate_at(records, fit.values))
             known[id(records.model)] = states, states.changes(own)
-        name = double(records, key, *known[id(records.model)], library)
-        found |= {key: name} if name else {}
+        one = double(records, key, *known[id(records.model)], library)
+        found |= {key: one} if one else {}
     return found
 
 
 def double(
     records: WhiteRecords, key: EffectKey, alone: States, own: Mapping[str, Array], library: Library
-) -> str:  # fmt: skip
-    """Return which parameter or constant is the law of an effect, "" for none.
+) -> Double | None:  # fmt: skip
+    """Return which parameter or constant is the law of an effect, None for none.
 
     alone: no effect acts there. own: change by each parameter and constant there.
     """
     declared, all_strengths = records.model.parameters, strengths(records, library)
     names = all_strengths.get(key, [])
     if len(names) != 1:
-        return ""
+        return None
     size, ports = library.strength_of(names[0], declared[names[0]]), library.candidates[key].adds.keys()
     change = alone.change(names[0], size)
-    same = [n for n, other in own.items() if apart(change, other) < SAME_LAW]
+    same = {n: share for n, other in own.items() if (share := apart(change, other)) < SAME_LAW}
     if not same:
-        return ""
+        return None
     company = {n: COMPANY * library.strength_of(n, declared[n]) for other, theirs in all_strengths.items()
                if not ports & library.candidates[other].adds.keys() for n in theirs}  # fmt: skip
     acting = alone.moved(company)
     change = acting.change(names[0], size)
     shares = {n: apart(change, other) for n, other in acting.changes(same).items()}
     name = min(shares, key=lambda n: shares[n])
-    return name if shares[name] < SAME_IN_COMPANY else ""
+    return Double(name, same[name] < ROUNDING_OF_LAW) if shares[name] < SAME_IN_COMPANY else None
 
 
 def strengths(records: WhiteRecords, library: Library) -> dict[EffectKey, list[str]]:

@@ -344,8 +344,8 @@ def known_together(fit: Fit, library: Library) -> tuple[str, ...]:
 
     What the free strengths of effects make up for counts as unseen. An effect that a parameter is already comes last.
     """
-    doubles = [f"{key.public} would do what {name} does already, and was not looked for"
-               for key, name in library.left_out.items()]  # fmt: skip
+    doubles = dict.fromkeys(f"{key.public} would do what {name} does already, and was not looked for"
+                            for key, name in library.left_out.items())  # fmt: skip
     own, strengths = {}, [np.zeros(len(fit.residual))]
     for name, value in fit.values.items():
         owner = library.owner(name)

@@ -13,7 +13,7 @@ from armid.estimation.information import NORMAL_95
 from armid.inference.candidates import ERROR_OF
 from armid.inference.carry_over import missed_sentences, over_noise
 from armid.inference.checks import Finding, Residuals, time_in_words
-from armid.inference.decisions import LISTED, OVER_NOISE, SIGNIFICANCE
+from armid.inference.decisions import EXPLAINS, LISTED, OVER_NOISE, SIGNIFICANCE
 from armid.inference.hypothesis import words
 from armid.inference.infer import Inference, sentence_of
 from armid.inference.missing_signal import Missing
@@ -400,12 +400,26 @@ def unexplained(loop: ClosedLoop) -> str:
     output, left = next(iter(loop.outputs.values())), loop.after.train.errors.rmse
     if may_be_inputs(output["noise_rms"], output["moved_by_inputs"], left):
         return "What remains is more than the noise of the sensors, and noise of the inputs may be all of it."
-    return "The declared model lacks something that the library does not hold."
+    return f"The declared model lacks something that the library does not hold. {most_in(loop)}".rstrip()
+
+
+def most_in(loop: ClosedLoop) -> str:
+    """Say in which of several train records most of what remains lies, "" where it is in none."""
+    more: dict[str, float] = {}
+    for finding in loop.after.diagnosis.of_kind("record"):
+        file = finding.where.partition(", ")[0]  # what follows is the output
+        more[file] = more.get(file, 0.0) + max(finding.ratio - 1.0, 0.0)
+    total = sum(more.values())
+    name = max(more, key=lambda n: more[n], default="")
+    if len(more) < 3 or not np.isfinite(total) or more[name] <= EXPLAINS * total:
+        return ""
+    return f"{more[name] / total:.0%} of what the model leaves beyond noise lies in {name}: look at this record first."
 
 
 def partly(loop: ClosedLoop) -> str:
     best = f"Of the models of names alone, that with {' + '.join(loop.effects)} predicts parts left out of the fit best"
-    return f"The declared model lacks something that the library does not hold. {best}{unclaimed(loop)}"
+    lacks = f"The declared model lacks something that the library does not hold. {most_in(loop)}".rstrip()
+    return f"{lacks} {best}{unclaimed(loop)}"
 
 
 def nothing_missing(loop: ClosedLoop) -> str:

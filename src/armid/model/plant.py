@@ -82,8 +82,9 @@ class Manoeuvre:
 class Constant:
     """Declare a known quantity with its default value, SI.
 
-    tolerance: relative half-range within which the value is known: 0 for an exact one, None where it is not declared,
-    which counts as exact until a campaign says otherwise. low, high: what is physically possible, ends included.
+    tolerance: relative standard deviation with which the value is known: 0 for an exact one, None where it is not
+    declared, which counts as exact until a campaign says otherwise. low, high: what is physically possible, ends
+    included.
     """
 
     name: str

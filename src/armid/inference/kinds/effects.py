@@ -38,13 +38,13 @@ def hypotheses(library: Library) -> dict[EffectKey, Hypothesis]:
     """Return a hypothesis for each form of each effect; the forms of one effect share its prior.
 
     That a user asks for a few candidates makes none of them more probable: the whole library shares what is expected.
-    What does the same as a constant within its tolerance is as improbable as that this tolerance is wrong.
+    What the machine does already, as a constant or in another form, is as improbable as that a tolerance is wrong.
     """
     n, forms = len(library.known_names), [key.public for key in library.candidates]
 
     def odds(key: EffectKey) -> float:
         usual = calibration().log_odds("effect", n, key.public)
-        usual += float(np.log(OUT_OF_TOLERANCE)) if library.doubles.get(key) in library.tolerances else 0.0
+        usual += float(np.log(OUT_OF_TOLERANCE)) if key in library.doubles else 0.0
         return library.log_odds(key.public, usual) - float(np.log(forms.count(key.public)))
 
     return {key: Hypothesis("effect", key.public, key.form, odds(key), key) for key in library.candidates}
