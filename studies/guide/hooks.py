@@ -24,6 +24,8 @@ from armid.study.spec import CaseSpec, EntrySpec, LoopSpec, ManoeuvreSpec, Rando
 ROOT = Path(__file__).parents[2]
 # A link to a file of the repository; an image keeps its place on the site, a file is named.
 OUTSIDE = re.compile(r"(!?)\[([^\]]*)\]\((?:\.\./)+((?:results|studies|src|tests|\.github)/[^)#]*|\.github[^)#]*)\)")
+# A place of a page where a file of the repository, or the table of ports, is inserted.
+INSERTED = re.compile(r"<!-- (ports|file)(?: (\S+))? -->")
 FIGURE = r"!\[([^\]]*)\]\({name}\.png\)\n*([^#!|\n].*)?"
 KEYS = ("Made from the definitions that armid reads the files with. `armid schema campaign` and `armid schema study` "
         "print the same as JSON Schema, for editors.")  # fmt: skip
@@ -48,11 +50,27 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
     up = "../" * page.file.src_uri.count("/")
+    markdown = INSERTED.sub(lambda m: ports_table() if m[1] == "ports" else listing(m[2]), markdown)
     return OUTSIDE.sub(lambda m: f"![{m[2]}]({up}{m[3]})" if m[1] else f"{m[2]} (`{m[3]}`)", markdown)
 
 
 def elsewhere(path: str) -> str:
     return (ROOT / path).read_text(encoding="utf-8")
+
+
+def listing(path: str) -> str:
+    return f"```python\n{elsewhere(path)}```"
+
+
+def ports_table() -> str:
+    """Return which effects of the library act at which port."""
+    names: dict[str, set[str]] = {}
+    for effect in armid.EFFECTS.values():
+        for form in effect.every_form:
+            for port in form.adds:
+                names.setdefault(port, set()).add(effect.name)
+    rows = [f"| `{port}` | {', '.join(f'`{n}`' for n in sorted(own))} |" for port, own in sorted(names.items())]
+    return "\n".join(["| port | effects |", "|---|---|", *rows])
 
 
 def keys_page() -> str:

@@ -313,6 +313,7 @@ def concluded(verdict, effects=(), claimed=(), alternatives=(), moved=0.0, shows
         verdict=verdict, effects=effects, steps=steps,
         outputs={"speed": {"noise_rms": 0.1, "moved_by_inputs": moved}},
         after=SimpleNamespace(significant=True,
+                              fit=SimpleNamespace(deviations={"mass": -3.0}, constants={"mass": -0.06}),
                               diagnosis=SimpleNamespace(
                                   significant=shows_on_train, p=0.002, of_kind=lambda _: [
                                       SimpleNamespace(where=w, ratio=r) for w, r in ratios]),
@@ -324,9 +325,10 @@ def concluded(verdict, effects=(), claimed=(), alternatives=(), moved=0.0, shows
 def test_a_conclusion_is_what_the_tests_say():
     missed = concluded("no_discrepancy")
     assert "on the train records is noise" in missed
-    assert "held out are missed by more than noise, but by less than 1.1 times" in missed
+    assert "on those held out, but their error is less than 1.1 times the noise" in missed
     little = concluded("no_discrepancy", shows_on_train=True)
-    assert "differs little from noise (chance 0.002): nothing is missing" in little
+    assert "is larger than noise by too little to matter (chance 0.002): nothing is missing" in little
+    assert little.endswith("mass is 3.0 standard deviations below its declared value (-6.0%).")
     predicts = "that with a + b predicts parts left out of the fit best"
     assert concluded("partly_explained", ("a", "b")).endswith(f"{predicts}: no name is claimed.")
     assert concluded("partly_explained", ("a", "b"), "a").endswith(f"{predicts}: b is not claimed.")

@@ -72,8 +72,8 @@ def test_a_closed_loop_says_what_the_issue_asks_for(tmp_path):
 
 
 def test_a_constant_far_off_a_drift_and_an_output_that_is_not_there_are_called_so():
-    fit = SimpleNamespace(deviations={"length": -4.02, "load_mass": 1.9})
-    assert constant_sentences(fit) == ["length is 4.0 deviations from its declared value."]
+    fit = SimpleNamespace(deviations={"length": -4.02, "load_mass": 1.9}, constants={"length": -0.0402})
+    assert constant_sentences(fit) == ["length is 4.0 standard deviations below its declared value (-4.0%)."]
     report = loop_report()
     report["probabilities"]["drifts"] = {"mass": 0.38, "constant:force_constant": 0.4}
     assert "; drift of mass 0.38; drift of force_constant 0.40; nothing" in chances_sentence(report)

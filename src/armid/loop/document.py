@@ -348,7 +348,8 @@ def details_of(loop: ClosedLoop) -> dict[str, Any]:
     return plain({
         "versions": versions_of(PACKAGES_OF_IDENTIFY),
         "conclusion": conclusion(loop),
-        "shifts": (shift_sentences(before, after) if loop.steps else []) + constant_sentences(in_force),
+        "shifts": (shift_sentences(before, after) if loop.steps else [])
+        + ([] if loop.verdict == NO_DISCREPANCY else constant_sentences(in_force)),
         "doubts": doubt_sentences(after),
         "suspects": [fault_sentence(s) for s in loop.suspects],
         "declared_by": declared_by(loop),
@@ -424,15 +425,17 @@ def partly(loop: ClosedLoop) -> str:
 
 def nothing_missing(loop: ClosedLoop) -> str:
     if loop.after.diagnosis.significant or not loop.after.significant:
-        return f"What the declared model leaves {as_noise(loop)}: nothing is missing that these records could show."
-    return ("What the declared model leaves on the train records is noise: nothing is missing that they could show. "
-            f"Those held out are missed by more than noise, but by less than {OVER_NOISE:g} times, as a prediction may "
-            "be.")  # fmt: skip
+        said = f"What the declared model leaves {as_noise(loop)}: nothing is missing that these records could show."
+    else:
+        said = ("What the declared model leaves on the train records is noise: nothing is missing that they could "
+                "show. A test finds more than noise on those held out, but their error is less than "
+                f"{OVER_NOISE:g} times the noise, as that of a prediction may be.")  # fmt: skip
+    return " ".join([said, *constant_sentences(loop.after.fit)])
 
 
 def as_noise(loop: ClosedLoop) -> str:
     seen = loop.after.diagnosis
-    return f"differs little from noise (chance {seen.p:.2g})" if seen.significant else "is noise"
+    return f"is larger than noise by too little to matter (chance {seen.p:.2g})" if seen.significant else "is noise"
 
 
 def declared_by(loop: ClosedLoop) -> str:
@@ -581,8 +584,13 @@ def shift_sentences(before: Judgement, after: Judgement) -> list[str]:
 
 def constant_sentences(fit: Fit) -> list[str]:
     """Say which constants are farther from their declared values than 95 % of sound ones."""
-    return [f"{name} is {abs(off):.1f} deviations from its declared value."
-            for name, off in fit.deviations.items() if abs(off) > NORMAL_95]  # fmt: skip
+    said = []
+    for name, off in fit.deviations.items():
+        if abs(off) > NORMAL_95:
+            share = f" ({fit.constants[name]:+.1%})" if name in fit.constants else ""
+            side = "above" if off > 0.0 else "below"
+            said.append(f"{name} is {abs(off):.1f} standard deviations {side} its declared value{share}.")
+    return said
 
 
 def doubt_sentences(judged: Judgement) -> list[str]:

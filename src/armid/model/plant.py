@@ -204,7 +204,7 @@ class Plant:
 
     An argument is a state, parameter, constant, input, latch, port or quantity of that name, or `time` [s]. What an
     initial value takes must not vary in time. Functions use numpy, math, numbers and functions of their own kind;
-    np.where, np.minimum and np.maximum choose. studies/your_own_machine/ explains a whole plant line by line.
+    np.where, np.minimum and np.maximum choose. studies/your_own_machine/ explains a whole plant part by part.
 
     name: as campaign.toml spells it. parameters: what is searched. states: what is integrated.
     quantities: name -> function of states, parameters, constants, inputs, latches, ports and other quantities; the
