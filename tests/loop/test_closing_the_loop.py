@@ -312,8 +312,9 @@ def concluded(verdict, effects=(), claimed=(), alternatives=(), moved=0.0, shows
     return conclusion(SimpleNamespace(
         verdict=verdict, effects=effects, steps=steps,
         outputs={"speed": {"noise_rms": 0.1, "moved_by_inputs": moved}},
+        inference=SimpleNamespace(in_force=0, exploration=SimpleNamespace(
+            fits=[SimpleNamespace(deviations={"mass": -3.0}, constants={"mass": -0.06})])),
         after=SimpleNamespace(significant=True,
-                              fit=SimpleNamespace(deviations={"mass": -3.0}, constants={"mass": -0.06}),
                               diagnosis=SimpleNamespace(
                                   significant=shows_on_train, p=0.002, of_kind=lambda _: [
                                       SimpleNamespace(where=w, ratio=r) for w, r in ratios]),

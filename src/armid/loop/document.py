@@ -430,7 +430,7 @@ def nothing_missing(loop: ClosedLoop) -> str:
         said = ("What the declared model leaves on the train records is noise: nothing is missing that they could "
                 "show. A test finds more than noise on those held out, but their error is less than "
                 f"{OVER_NOISE:g} times the noise, as that of a prediction may be.")  # fmt: skip
-    return " ".join([said, *constant_sentences(loop.after.fit)])
+    return " ".join([said, *constant_sentences(loop.inference.exploration.fits[loop.inference.in_force])])
 
 
 def as_noise(loop: ClosedLoop) -> str:
