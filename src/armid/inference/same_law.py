@@ -7,8 +7,8 @@ parameter changes all rates and outputs as the effect does. Other effects act me
 like another mass only until something else acts.
 """
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -24,30 +24,46 @@ from armid.inference.whitening import WhiteRecords
 from armid.model import Array, Model
 from armid.model.graph import LATE_LEAVES
 
-# Two forms of one law differ by up to 4e-4 of their square, two laws by 2e-3 and more, and by 0.05 where other effects
-# act (measured on nine machines).
-ROUNDING_OF_LAW, SAME_LAW, SAME_IN_COMPANY = 1e-9, 1e-3, 0.01
+# Two forms of one law differ by up to 4e-4 of their square, two laws by 2e-3 and more (measured on nine machines).
+ROUNDING_OF_LAW, SAME_LAW = 1e-9, 1e-3
 # States at which laws are compared, and by which share of their range they leave that of the records to either side.
 N_STATES, FARTHER = 1000, 0.5
-# Share of their size with which other effects act, and of its size or value by which each parameter is changed.
-COMPANY, CHANGED = 0.1, 1e-4
+# Share of its size or value by which each parameter is changed.
+CHANGED = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class States:
-    """Hold states at which the equations of a model are evaluated: key of a leaf -> one value, or one of each state."""
+    """Hold states at which the equations of a model are evaluated: key of a leaf -> one value, or one of each state.
+
+    added: what acts at ports besides, port -> one of each state.
+    """
 
     model: Model
     values: Mapping[str, Any]
+    added: Mapping[str, Array] = field(default_factory=dict)
 
     @cached_property
     def rates(self) -> dict[str, Array]:
         """Rates of all states, and the outputs."""
-        graph = self.model.graph
+        graph, values = self.model.graph, dict(self.values)
         keys = [n.key for n in graph.of_kind("rate")] + [o.signal for o in self.model.plant.outputs]
         with np.errstate(all="ignore"):
-            values = graph.values(keys, self.values)
+            for node in graph.order(keys):
+                value = node.value(values)
+                values[node.key] = value + self.added[node.key] if node.key in self.added else value
         return {key: np.broadcast_to(values[key], N_STATES) for key in keys}
+
+    def disturbed(self, but: Collection[str]) -> "States":
+        """Return the same states with something else at each port but some, which moves rates by their own size."""
+        draws = np.random.default_rng(1).standard_normal((len(self.model.plant.ports), N_STATES))
+        added = {}
+        for port, draw in zip(self.model.plant.ports, draws, strict=True):
+            tried = replace(self, added={port: draw}).rates
+            moved = [size_of(tried[key] - x) / size_of(x) for key, x in self.rates.items() if size_of(x) > 0.0]
+            if port not in but and np.isfinite(moved).all() and max(moved, default=0.0) > 0.0:
+                added[port] = draw / max(moved)
+        return replace(self, added=added)
 
     def moved(self, changes: Mapping[str, float]) -> "States":
         """Return the same states with other parameters or constants; changes: name -> what is added."""
@@ -56,12 +72,11 @@ class States:
     def change(self, name: str, size: float) -> Array:
         """Return the change of rates and outputs per change of a parameter or constant, (n, n_states).
 
-        Each over how much it varies from state to state.
+        Each over its size.
         """
         after, rows = self.moved({name: CHANGED * size}).rates, []
         for key, before in self.rates.items():
-            spread = float(np.nanstd(before))
-            rows.append((after[key] - before) / (spread or 1.0))
+            rows.append((after[key] - before) / (size_of(before) or 1.0))
         return np.array(rows)
 
     def changes(self, own: Iterable[str]) -> dict[str, Array]:
@@ -103,13 +118,12 @@ def double(
     same = {n: share for n, other in own.items() if (share := apart(change, other)) < SAME_LAW}
     if not same:
         return None
-    company = {n: COMPANY * library.strength_of(n, declared[n]) for other, theirs in all_strengths.items()
-               if not ports & library.candidates[other].adds.keys() for n in theirs}  # fmt: skip
-    acting = alone.moved(company)
+    # Something else acts at the other ports.
+    acting = alone.disturbed(ports)
     change = acting.change(names[0], size)
     shares = {n: apart(change, other) for n, other in acting.changes(same).items()}
     name = min(shares, key=lambda n: shares[n])
-    return Double(name, same[name] < ROUNDING_OF_LAW) if shares[name] < SAME_IN_COMPANY else None
+    return Double(name, same[name] < ROUNDING_OF_LAW) if shares[name] < SAME_LAW else None
 
 
 def strengths(records: WhiteRecords, library: Library) -> dict[EffectKey, list[str]]:
@@ -151,6 +165,12 @@ def scattered(records: WhiteRecords, candidate: Array) -> States:
     values |= {name: drawn(name) for name in seen}
     values |= {node.key: drawn(node.needs[0]) for node in model.graph.of_kind(*LATE_LEAVES)}
     return States(model, values)
+
+
+def size_of(signal: Array) -> float:
+    """Return the root mean square of what is finite, 0 where nothing is."""
+    good = signal[np.isfinite(signal)]
+    return float(np.sqrt(np.mean(good**2))) if good.size else 0.0
 
 
 def apart(one: Array, other: Array) -> float:
