@@ -15,7 +15,7 @@ posterior     probabilities of hypotheses and sets; intervals that count what ma
 checks        whether a residual is more than noise, and where
 carry_over    what a model predicts of what its fit has not seen: records held out, parts left out in turn
 
-Also here: missing_signal (the signal that a model lacks at each port), same_law (effects that the declared model has).
+Also here: missing_signal (the signal that a model lacks at each port).
 """
 
 from armid.inference.infer import Inference, infer, prepared

@@ -22,10 +22,10 @@ from armid.inference.checks import is_significant, train_residuals
 from armid.inference.decisions import LISTED, MENTIONED, calibration
 from armid.inference.evidence import Expansion, expansion_of
 from armid.inference.hypothesis import Hypotheses, Hypothesis
+from armid.inference.kinds.same_law import doubles
 from armid.inference.library import Library, library_of
 from armid.inference.model import ROUGHLY, Fit, accurate, fit_from, start_of
 from armid.inference.posterior import CONSTANTS_TEXT, Posterior, posterior, spread
-from armid.inference.same_law import doubles
 from armid.inference.search import Exploration, explore, without_denied
 from armid.inference.unknowns import freed
 from armid.inference.whitening import WhiteRecords, whitened, with_answers
@@ -303,25 +303,27 @@ def infer(library: Library, declared: Fit) -> Inference:
     inference = inferred(library, declared)
     # First, as inputs that are taken for noisy look like noise in motion.
     exact = with_exact_inputs(library, inference)
-    if exact is not library:
-        declared = declared_again(exact, declared)
-        inference = inferred(exact, declared)
-    shown = with_noise_in_motion(exact, inference)
-    if shown is not exact:
-        again = declared_again(shown, declared)
-        shown, declared = (shown, again) if exact is not library else with_input_noise(shown, again)
-        inference = inferred(shown, declared)
-    if exact is not library or not pooled_noise(shown.data.records):
+    is_exact = exact is not library
+    if is_exact:
+        library, declared = exact, declared_again(exact, declared)
+        inference = inferred(library, declared)
+    shown = with_noise_in_motion(library, inference)
+    if shown is not library:
+        library, declared = shown, declared_again(shown, declared)
+        if not is_exact:
+            library, declared = with_input_noise(library, declared)
+        inference = inferred(library, declared)
+        exact = with_exact_inputs(library, inference)
+        if exact is not library:
+            return inferred(exact, declared_again(exact, declared))
+    if is_exact or not pooled_noise(library.data.records):
         return inference
-    exact = with_exact_inputs(shown, inference)
-    if exact is not shown:
-        return inferred(exact, declared_again(exact, declared))
     fit = inference.exploration.fits[inference.in_force]
     if fit.active and inference.posterior.probability("unknown") >= MENTIONED:
         # the declared model may answer to its inputs quite otherwise
-        answering = with_measured_inputs(as_exact(shown), fit)
+        answering = with_measured_inputs(as_exact(library), fit)
         if may_be_all(answering, fit):
-            shown.say("the same with the noise of the inputs as the best model answers to it")
+            library.say("the same with the noise of the inputs as the best model answers to it")
             return inferred(answering, declared_again(answering, declared))
     return inference
 

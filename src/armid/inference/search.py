@@ -324,10 +324,10 @@ def expand(exploration: Exploration, model: Hypotheses) -> None:
         trials += best_begun(exploration, model, held, ahead_held, limit, N_ADDED)
     else:
         # forms share the prior of a name: that a name has more of them makes none less worth a fit
-        forms = Counter(f.proposal.hypothesis.name for f in ahead)
-        added = [i for i, f in enumerate(ahead) if max(f.posterior, ahead_held[i].posterior)
-                 + np.log(forms[f.proposal.hypothesis.name]) > REFITTED]  # fmt: skip
-        for i in sorted(added, key=lambda i: -max(ahead[i].posterior, ahead_held[i].posterior))[:N_ADDED]:
+        n_forms = Counter(p.hypothesis.name for p in proposals)
+        odds = [max(f.posterior, h.posterior) for f, h in zip(ahead, ahead_held, strict=True)]
+        added = [i for i, p in enumerate(proposals) if odds[i] + np.log(n_forms[p.hypothesis.name]) > REFITTED]
+        for i in sorted(added, key=lambda i: -odds[i])[:N_ADDED]:
             trials += trial_of(exploration, model, held, ahead_held[i], limit)
     trials += [t for f in leading(beside) for t in trial_of(exploration, model, about, f, limit)]
     ranked = exploration.ranked()
@@ -336,8 +336,8 @@ def expand(exploration: Exploration, model: Hypotheses) -> None:
         trials += exchanges(exploration, model, fit, limit)
     trials += drops(exploration, model)
     if not is_far and exploration.log_posterior(model, scale) > ranked[0][1] - WINDOW:
-        others = effects.propose_forms(fit, exploration.known, library)
-        trials += swaps(exploration, model, fit, scale, [*proposals, *others], limit)
+        forms = effects.propose_forms(fit, exploration.known, library)
+        trials += swaps(exploration, model, fit, scale, [*proposals, *forms], limit)
     made = library.each(lambda t: t[1](), trials)
     for (key, _), again in zip(trials, made, strict=True):
         exploration.take_or_refuse(key, again)

@@ -401,6 +401,10 @@ def unexplained(loop: ClosedLoop) -> str:
     output, left = next(iter(loop.outputs.values())), loop.after.train.errors.rmse
     if may_be_inputs(output["noise_rms"], output["moved_by_inputs"], left):
         return "What remains is more than the noise of the sensors, and noise of the inputs may be all of it."
+    return lacking(loop)
+
+
+def lacking(loop: ClosedLoop) -> str:
     return f"The declared model lacks something that the library does not hold. {most_in(loop)}".rstrip()
 
 
@@ -419,18 +423,17 @@ def most_in(loop: ClosedLoop) -> str:
 
 def partly(loop: ClosedLoop) -> str:
     best = f"Of the models of names alone, that with {' + '.join(loop.effects)} predicts parts left out of the fit best"
-    lacks = f"The declared model lacks something that the library does not hold. {most_in(loop)}".rstrip()
-    return f"{lacks} {best}{unclaimed(loop)}"
+    return f"{lacking(loop)} {best}{unclaimed(loop)}"
 
 
 def nothing_missing(loop: ClosedLoop) -> str:
     if loop.after.diagnosis.significant or not loop.after.significant:
-        said = f"What the declared model leaves {as_noise(loop)}: nothing is missing that these records could show."
+        text = f"What the declared model leaves {as_noise(loop)}: nothing is missing that these records could show."
     else:
-        said = ("What the declared model leaves on the train records is noise: nothing is missing that they could "
+        text = ("What the declared model leaves on the train records is noise: nothing is missing that they could "
                 "show. A test finds more than noise on those held out, but their error is less than "
                 f"{OVER_NOISE:g} times the noise, as that of a prediction may be.")  # fmt: skip
-    return " ".join([said, *constant_sentences(loop.inference.exploration.fits[loop.inference.in_force])])
+    return " ".join([text, *constant_sentences(loop.inference.exploration.fits[loop.inference.in_force])])
 
 
 def as_noise(loop: ClosedLoop) -> str:

@@ -1,1 +1,4 @@
-"""Kinds of hypotheses."""
+"""Kinds of hypotheses, one file each: effects, faults, drifts, unknown.
+
+Also here: same_law (effects that are what the declared model has already).
+"""

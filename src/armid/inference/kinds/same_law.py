@@ -3,8 +3,9 @@
 Viscous friction is the damping of a machine that has one: records cannot tell two shares of one quantity, and its
 interval would reach from none of it to all. Laws are compared and not records, since on one stroke friction does what a
 pressure does. At states and inputs drawn independently, an effect and a parameter are one law where one change of the
-parameter changes all rates and outputs as the effect does. Other effects act meanwhile: a wrong gain of the drive looks
-like another mass only until something else acts.
+parameter changes all rates and outputs as the effect does. Then also while something else acts at the other ports: a
+wrong gain of the drive looks like another mass only until something else acts. An effect in exactly the form of a
+parameter is not tried. One in another form (a sign that is smoothed otherwise) is improbable.
 """
 
 from collections.abc import Collection, Iterable, Mapping
@@ -14,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from armid.engine import simulate
+from armid.engine import along
 from armid.engine.simulate import flat
 from armid.inference.candidates import Double, EffectKey
 from armid.inference.kinds.effects import beside
@@ -23,6 +24,7 @@ from armid.inference.model import Fit, candidate_at
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array, Model
 from armid.model.graph import LATE_LEAVES
+from armid.problem.problem import by_record
 
 # Two forms of one law differ by up to 4e-4 of their square, two laws by 2e-3 and more (measured on nine machines).
 ROUNDING_OF_LAW, SAME_LAW = 1e-9, 1e-3
@@ -56,13 +58,15 @@ class States:
 
     def disturbed(self, but: Collection[str]) -> "States":
         """Return the same states with something else at each port but some, which moves rates by their own size."""
-        draws = np.random.default_rng(1).standard_normal((len(self.model.plant.ports), N_STATES))
-        added = {}
-        for port, draw in zip(self.model.plant.ports, draws, strict=True):
+        sizes, rng, added = {key: size_of(x) for key, x in self.rates.items()}, np.random.default_rng(1), {}
+        for port in self.model.plant.ports:
+            draw = rng.standard_normal(N_STATES)
+            if port in but:
+                continue
             tried = replace(self, added={port: draw}).rates
-            moved = [size_of(tried[key] - x) / size_of(x) for key, x in self.rates.items() if size_of(x) > 0.0]
-            if port not in but and np.isfinite(moved).all() and max(moved, default=0.0) > 0.0:
-                added[port] = draw / max(moved)
+            moved = max((size_of(tried[key] - self.rates[key]) / x for key, x in sizes.items() if x > 0.0), default=0.0)
+            if moved > 0.0:
+                added[port] = draw / moved
         return replace(self, added=added)
 
     def moved(self, changes: Mapping[str, float]) -> "States":
@@ -74,10 +78,8 @@ class States:
 
         Each over its size.
         """
-        after, rows = self.moved({name: CHANGED * size}).rates, []
-        for key, before in self.rates.items():
-            rows.append((after[key] - before) / (size_of(before) or 1.0))
-        return np.array(rows)
+        after = self.moved({name: CHANGED * size}).rates
+        return np.array([(after[key] - before) / (size_of(before) or 1.0) for key, before in self.rates.items()])
 
     def changes(self, own: Iterable[str]) -> dict[str, Array]:
         """Return the change by each of some parameters and constants."""
@@ -109,9 +111,10 @@ def double(
 
     alone: no effect acts there. own: change by each parameter and constant there.
     """
-    declared, all_strengths = records.model.parameters, strengths(records, library)
-    names = all_strengths.get(key, [])
-    if len(names) != 1:
+    declared = records.model.parameters
+    own_parameters = [declared[n] for n in records.space.names if key.owns(n)]
+    names = [n for n in records.space.names if key.owns(n) and declared[n].null is not None]
+    if len(names) != 1 or any(p.unit == "s" for p in own_parameters):
         return None
     size, ports = library.strength_of(names[0], declared[names[0]]), library.candidates[key].adds.keys()
     change = alone.change(names[0], size)
@@ -126,18 +129,6 @@ def double(
     return Double(name, same[name] < ROUNDING_OF_LAW) if shares[name] < SAME_LAW else None
 
 
-def strengths(records: WhiteRecords, library: Library) -> dict[EffectKey, list[str]]:
-    """Return the strengths of each candidate of a compiled model, but of those whose shapes are times."""
-    parameters: dict[EffectKey, list[str]] = {}
-    for name in records.space.names:
-        owner = library.owner(name)
-        if owner is not None:
-            parameters.setdefault(owner, []).append(name)
-    declared = records.model.parameters
-    return {key: [n for n in names if declared[n].null is not None] for key, names in parameters.items()
-            if all(declared[n].unit != "s" for n in names)}  # fmt: skip
-
-
 def scattered(records: WhiteRecords, candidate: Array) -> States:
     """Return a candidate with states and inputs that are independent of each other.
 
@@ -145,14 +136,13 @@ def scattered(records: WhiteRecords, candidate: Array) -> States:
     """
     model, seen = records.model, dict[str, list[Array]]()
     values: dict[str, Any] = {}
-    for replay in records.replays:
-        for piece, calibration in zip(replay.pieces, replay.calibrations, strict=True):
+    moving = [*model.states, *(i.name for i in model.plant.inputs), "time"]
+    for ready in by_record(records.replays):
+        for piece, calibration in zip(ready.record.pieces, ready.calibrations, strict=True):
             manoeuvre = piece.manoeuvre
-            run = simulate(model, manoeuvre, candidate[np.newaxis], calibration.schedule, states=True)
             values |= dict(zip(model.constants, model.constant_values(manoeuvre.constants), strict=True))
-            motion = {name: state[0] for name, state in run.states.items()} | {"time": manoeuvre.times()}
-            for name, signal in (motion | {i.name: manoeuvre.inputs[i.name] for i in model.plant.inputs}).items():
-                seen.setdefault(flat(name), []).append(np.asarray(signal, dtype=float))
+            for name, signal in along(model, manoeuvre, candidate, calibration.schedule, moving).items():
+                seen.setdefault(flat(name), []).append(signal)
     values |= dict(zip(map(flat, model.parameters), map(float, candidate), strict=True))
     values |= dict.fromkeys(map(flat, model.latches), 0.0)
     rng = np.random.default_rng(0)
