@@ -112,7 +112,7 @@ def information_of(
     if weighed is not None:
         covariance = np.where(known, determined @ (towards.T @ towards) @ determined, covariance)
     # what the box holds is held, and the others make up for that
-    step = step_in_box(own, towards.T @ residual, z, LEAST_DAMPING) - z
+    step = step_in_box(own, towards.T @ residual, z, LEAST_DAMPING, records.walls(z)) - z
     started = np.array([towards.T @ (rows * change) for change in start_changes(records, z)])
     started = started.reshape(len(started), len(z))
     covariance = covariance + determined @ (started.T @ started) @ determined

@@ -34,6 +34,8 @@ STEP = 1e-6
 AT_BOUND = 1e-5
 # Relative fall of chi2 in one step at which a fit has arrived.
 TOLERANCE = 1e-9
+# A delay this close to a jump of chi2 does not step over it, and lies at least so far from it, in sample intervals.
+NEXT_TO_JUMP, OFF_JUMP = 1e-2, 1e-6
 
 
 def held_by_bound(space: Space, x: Array) -> NDArray[np.bool_]:
@@ -94,17 +96,62 @@ class LeastSquaresProblem:
         total = np.sum(self.residuals(Z) ** 2, axis=1)
         return np.where(np.isfinite(total), total, np.inf)
 
+    @cached_property
+    def jumps(self) -> list[tuple[int, Array]]:
+        """The places of free delays, and at which shares of the range chi2 jumps in them.
+
+        A held input that is late by whole samples jumps at a sample, which shows it or not.
+        """
+        names = self.space.free_names
+        delays = [names.index(n) for n in self.model.delays if n in names]
+        grids = [piece.manoeuvre for r in self.replays for piece in r.pieces] if delays else []
+        held = {m.interval for m in grids if any((i.hold or m.hold) == "zero" for i in self.model.plant.inputs)}
+        low, high = self.space.low[self.space.free], self.space.high[self.space.free]
+        return [(i, (t * np.arange(np.ceil(low[i] / t), high[i] // t + 1) - low[i]) / (high[i] - low[i]))
+                for i in delays for t in held]  # fmt: skip
+
+    def walls(self, z: Array) -> tuple[Array, Array]:
+        """Return the shares between which a step stays, (n_free,) each: no delay steps over a jump next to it."""
+        low, high = np.zeros(len(z)), np.ones(len(z))
+        for i, edges in self.jumps:
+            if len(edges) < 2:
+                continue
+            apart, edge = edges[1] - edges[0], edges[int(np.argmin(np.abs(edges - z[i])))]
+            if 0.0 < edge - z[i] + OFF_JUMP * apart < NEXT_TO_JUMP * apart:
+                high[i] = min(high[i], edge - OFF_JUMP * apart)
+            elif 0.0 < z[i] - edge < NEXT_TO_JUMP * apart:
+                low[i] = max(low[i], edge + OFF_JUMP * apart)
+        return low, np.maximum(high, low)
+
+    def across(self, z: Array) -> list[Array]:
+        """Return the candidates on both sides of the jump that is next to each delay of one."""
+        sides = []
+        for i, edges in self.jumps:
+            if len(edges) > 1:
+                apart, edge = edges[1] - edges[0], edges[int(np.argmin(np.abs(edges - z[i])))]
+                for off in (-OFF_JUMP, OFF_JUMP):
+                    side = z.copy()
+                    side[i] = np.clip(edge + off * apart, 0.0, 1.0)
+                    sides.append(side)
+        return sides
+
     def residual_and_slopes(self, z: Array) -> tuple[Array, Array]:
         """Return the residual (n_samples,) and d signal / d z (n_samples, n_free), all in one population.
 
-        Where one side of a central difference diverges the other stands alone, where both do the slope is 0.
+        Where one side of a central difference diverges, or lies over a jump, the other stands alone; where both diverge
+        the slope is 0.
         """
         signals = self.signals(np.concatenate([z[np.newaxis], stencil(z)]))
         here, slopes, n = signals[0], slopes_of(signals[1:]), len(z)
-        for i in np.flatnonzero(~np.isfinite(slopes).all(axis=1)):
+        low, high = self.walls(z)
+        for i in np.flatnonzero(~np.isfinite(slopes).all(axis=1) | (low > 0.0) | (high < 1.0)):
             shift = float(np.clip(z[i], STEP, 1.0 - STEP) - z[i])
-            sides = ((signals[1 + i], shift + STEP), (signals[1 + n + i], shift - STEP))
-            quotients = [(signal - here) / step for signal, step in sides if step != 0.0 and np.isfinite(signal).all()]
+            sides = [
+                ((signals[1 + i], shift + STEP), high[i] < 1.0),
+                ((signals[1 + n + i], shift - STEP), low[i] > 0.0),
+            ]
+            quotients = [(signal - here) / step for (signal, step), is_over in sides
+                         if step != 0.0 and not is_over and np.isfinite(signal).all()]  # fmt: skip
             slopes[i] = quotients[0] if quotients and np.isfinite(here).all() else 0.0
         return np.asarray(self.measured - here), np.ascontiguousarray(slopes.T)
 
@@ -283,7 +330,18 @@ def descend(
     differences, at twice the price. limit: chi2 that must be in reach, see REACH; what gives up is where it was then.
     most: steps.
     """
-    first = np.clip(np.array(starts), 0.0, 1.0)
+    best = descended(records, np.clip(np.array(starts), 0.0, 1.0), tolerance, central, limit, most)
+    while sides := records.across(best.z):
+        chi2 = records.chi2(np.array(sides))
+        if not chi2.min() < best.chi2 * (1.0 - tolerance):
+            break
+        best = descended(records, np.array(sides)[[int(np.argmin(chi2))]], tolerance, central, limit, most)
+    return best.z
+
+
+def descended(
+    records: LeastSquaresProblem, first: Array, tolerance: float, central: bool, limit: float, most: int
+) -> "Descent":  # fmt: skip
     paths = [Descent(z, r, float(r @ r)) for z, r in zip(first, records.residuals(first), strict=True)]
     for _ in range(most):
         moving = [p for p in paths if not p.done]
@@ -295,7 +353,7 @@ def descend(
             if all(np.max(np.abs(path.z - better.z), initial=0.0) > SAME_POINT for better in apart):
                 apart.append(path)
         paths = apart
-    return min(paths, key=lambda p: p.chi2).z
+    return min(paths, key=lambda p: p.chi2)
 
 
 def advance(
@@ -304,12 +362,12 @@ def advance(
     slopes = [records.residual_and_slopes(p.z)[1] for p in paths] if central else forward_slopes(records, paths)
     left = [(p, j.T @ j, j.T @ p.residual) for p, j in zip(paths, slopes, strict=True)]
     for path, square, slope in left if not central else ():
-        falls = promised_fall(square, slope, path.z)
+        falls = promised_fall(square, slope, path.z, records.walls(path.z))
         path.done = falls <= tolerance * path.chi2 or path.chi2 - REACH_OF_PATH * falls > limit
     left = [one for one in left if not one[0].done]
     while left:
         dampings = [[max(f * p.damping, LEAST_DAMPING) for f in LADDER] for p, *_ in left]
-        tried = [[step_in_box(square, slope, p.z, d) for d in ds]
+        tried = [[step_in_box(square, slope, p.z, d, records.walls(p.z)) for d in ds]
                  for (p, square, slope), ds in zip(left, dampings, strict=True)]  # fmt: skip
         residuals = records.residuals(np.concatenate(tried)).reshape(len(left), len(LADDER), -1)
         left = [one for one, z, r, d in zip(left, tried, residuals, dampings, strict=True)
@@ -332,24 +390,24 @@ def taken(path: Descent, tried: Sequence[Array], residuals: Array, dampings: Seq
     return path.done
 
 
-def promised_fall(square: Array, slope: Array, z: Array) -> float:
+def promised_fall(square: Array, slope: Array, z: Array, walls: tuple[Array, Array]) -> float:
     """Return by how much a step without damping would lower chi2, to first order.
 
     square: J^T J, slope: J^T residual.
     """
-    return float(slope @ (step_in_box(square, slope, z, LEAST_DAMPING) - z))
+    return float(slope @ (step_in_box(square, slope, z, LEAST_DAMPING, walls) - z))
 
 
-def step_in_box(square: Array, slope: Array, z: Array, damping: float, n_boxed: int | None = None) -> Array:
+def step_in_box(square: Array, slope: Array, z: Array, damping: float, walls: tuple[Array, Array]) -> Array:
     """Return the candidate to which a damped step leads.
 
-    A parameter that would leave the box stops on it, and the others make up for that. n_boxed: so many of the first
-    have bounds, None: all.
+    A parameter that would leave the box stops on it, and the others make up for that. walls: the ends of the box, see
+    `LeastSquaresProblem.walls`; unknowns behind the parameters have none.
     """
     scale = np.diag(square)
     damped = square + np.diag(damping * scale + 1e-12 * max(float(scale.max(initial=0.0)), 1e-300))
-    boxed = np.arange(len(z)) < (len(z) if n_boxed is None else n_boxed)
-    low, high = np.where(boxed, 0.0, -np.inf), np.where(boxed, 1.0, np.inf)
+    n_others = len(z) - len(walls[0])
+    low, high = (np.append(wall, np.full(n_others, end)) for wall, end in zip(walls, (-np.inf, np.inf), strict=True))
     step = np.zeros(len(z))
     free = ~((z <= low) & (slope < 0.0) | (z >= high) & (slope > 0.0))
     while free.any():
@@ -370,7 +428,9 @@ def forward_slopes(records: LeastSquaresProblem, paths: Sequence[Descent]) -> li
     where both do, the slope is 0.
     """
     n = len(paths[0].z)
-    signs = np.array([np.where(p.z > 0.5, -1.0, 1.0) for p in paths])
+    walls = [records.walls(p.z) for p in paths]
+    signs = np.array([np.where(((p.z > 0.5) | (high < 1.0)) & (low == 0.0), -1.0, 1.0)
+                      for p, (low, high) in zip(paths, walls, strict=True)])  # fmt: skip
     points = np.concatenate([p.z + np.diag(STEP * s) for p, s in zip(paths, signs, strict=True)])
     residuals = records.residuals(points)
     slopes = []

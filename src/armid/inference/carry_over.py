@@ -71,6 +71,24 @@ def missed_sentences(missed: Sequence[Missed]) -> list[str]:
     return [" ".join([worst.sentence, *rest])]
 
 
+def in_doubt_sentences(train: Residuals, holdout: Residuals | None) -> list[str]:
+    """Return which held-out records are missed by far more than the train records, as far as the doubt lets them be."""
+    if holdout is None:
+        return []
+    outputs, words = [o.name for o in holdout.model.plant.outputs], []
+    for replay, raw, part in zip(holdout.replays, holdout.raw, holdout.data.by_record(holdout.residual), strict=True):
+        error = float(np.sqrt(np.mean(raw**2)))
+        least = least_noise(train, holdout)[outputs[replay.place]]
+        if error > NOT_CARRIED * least and float(np.sqrt(np.mean(part**2))) <= NOT_CARRIED:
+            words.append(f"{replay.name} by {shown(error, replay.record.unit)[0]:.3g} "
+                         f"{shown(error, replay.record.unit)[1]} ({error / least:.3g} times)")  # fmt: skip
+    if not words:
+        return []
+    return [f"Held-out records are missed by far more than train records: {', '.join(words)}. Their starts and the "
+            "parameters are known so roughly that this neither confirms nor denies the model. Measure what a start "
+            "lacks (as an output of the plant), or train on more records."]  # fmt: skip
+
+
 def missed_records(fit: Fit, train: Residuals, holdout: Residuals | None) -> list[Missed]:
     """Return the held-out records that are missed by more than noise, and by far more than the train records."""
     if holdout is None:

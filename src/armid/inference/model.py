@@ -94,7 +94,8 @@ class Fit:
     @cached_property
     def has_arrived(self) -> bool:
         """Whether a further step promises next to nothing of chi2; where that bends sharply, steps only creep."""
-        falls = promised_fall(self.jacobian.T @ self.jacobian, self.jacobian.T @ self.residual, self.z)
+        falls = promised_fall(self.jacobian.T @ self.jacobian, self.jacobian.T @ self.residual, self.z,
+                              self.records.walls(self.z))  # fmt: skip
         return falls <= ROUGHLY * self.chi2
 
     @cached_property

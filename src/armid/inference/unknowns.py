@@ -26,6 +26,7 @@ from armid.estimation.least_squares import (
     Descent,
     LeastSquaresProblem,
     forward_slopes,
+    promised_fall,
     step_in_box,
 )
 from armid.estimation.least_squares import STEP as Z_STEP
@@ -97,6 +98,10 @@ class ProjectedRecords(LeastSquaresProblem):
     def cover(self) -> Cover:
         return Cover.of(self.columns)
 
+    @property
+    def jumps(self) -> list[tuple[int, Array]]:
+        return self.records.jumps
+
     @cached_property
     def measured(self) -> Array:
         return self.cover.white(self.records.measured + self.columns @ self.values_known)
@@ -152,13 +157,11 @@ def freed(
     for _ in range(MOST_ROUGH if rough else MOST_ITERATIONS):
         problem = moved(base, unknowns, values)
         here, square, slope = normal_equations(problem, residual, columns, values, z, weight)
-        if (
-            cost - REACH_OF_PATH * float(slope @ (step_in_box(square, slope, here, LEAST_DAMPING, len(z)) - here))
-            > limit
-        ):
+        walls = base.walls(z)
+        if cost - REACH_OF_PATH * promised_fall(square, slope, here, walls) > limit:
             break
         dampings = [max(factor * damping, LEAST_DAMPING) for factor in LADDER]
-        tried = np.array([step_in_box(square, slope, here, d, len(z)) for d in dampings])
+        tried = np.array([step_in_box(square, slope, here, d, walls) for d in dampings])
         costs, residuals = costs_at(base, unknowns, tried[:, len(z) :], tried[:, : len(z)], weight)
         best = int(np.argmin(costs))
         fall, step = cost - costs[best], tried[best] - here
@@ -206,9 +209,11 @@ def polished(fit: Fit, weight: float) -> Fit:
     if base is None or fits_starts(base.replays):
         return fit
     unknowns, n = [f.unknown for f in fit.others], len(fit.z)
-    here = np.concatenate([np.clip(fit.z, INSIDE, 1.0 - INSIDE), [f.value for f in fit.others]])
     steps = np.repeat([Z_STEP, UNKNOWN_STEP], [n, len(unknowns)])
-    low, high = np.repeat([0.0, -np.inf], [n, len(unknowns)]), np.repeat([1.0, np.inf], [n, len(unknowns)])
+    low, high = (np.append(wall, np.full(len(unknowns), end))
+                 for wall, end in zip(base.walls(fit.z), (-np.inf, np.inf), strict=True))  # fmt: skip
+    inside = np.clip(fit.z, low[:n] + INSIDE, high[:n] - INSIDE)
+    here = np.concatenate([inside, [f.value for f in fit.others]])
 
     def residuals(X: Array) -> Array:
         whitened = residuals_at(base, unknowns, X[:, n:], X[:, :n])
@@ -226,7 +231,7 @@ def polished(fit: Fit, weight: float) -> Fit:
                              ftol=ARRIVED_STEP, xtol=ARRIVED_STEP, gtol=ARRIVED_STEP)  # fmt: skip
     z, values = solution.x[:n], solution.x[n:]
     # what came to the edge of the inside is on the bound
-    z = np.clip(z + INSIDE * (2.0 * z - 1.0), 0.0, 1.0)
+    z = np.clip(z + INSIDE * (2.0 * z - 1.0), low[:n], high[:n])
     V, Z = np.array([[f.value for f in fit.others], values]), np.array([fit.z, z])
     (before, after), (_, there) = costs_at(base, unknowns, V, Z, weight)
     if not after < before:

@@ -16,7 +16,7 @@ from armid.estimation.design import manoeuvre_grid
 from armid.estimation.identify import JointErrors, campaign_errors
 from armid.estimation.least_squares import held_by_bound
 from armid.inference.candidates import ERROR_OF
-from armid.inference.carry_over import missed_sentences, over_noise
+from armid.inference.carry_over import in_doubt_sentences, missed_sentences, over_noise
 from armid.inference.checks import holdout_residuals, is_significant, train_residuals
 from armid.inference.decisions import CLAIMED, DENIED, MENTIONED, OVER_NOISE, WINDOW, WITHIN
 from armid.inference.hypothesis import Hypotheses, Hypothesis, words
@@ -169,7 +169,8 @@ def close_loop(
     issues = (*issues, *given_twice(campaign.records))
     told_first = dict.fromkeys(s.sentence for s in issues if s.kind in TOLD or (at_a_loss and s.kind != "unjudged"))
     again = [f"Record {s.record} once more, or look at how it was made." for s in suspects if s.kind != "trend"]
-    said = (*told_first, *missed_sentences(after.missed), *limits_of(after), *dict.fromkeys(again))
+    doubt = [] if after.fails_to_carry_over else in_doubt_sentences(after.train, after.holdout)
+    said = (*told_first, *missed_sentences(after.missed), *doubt, *limits_of(after), *dict.fromkeys(again))
     return ClosedLoop(campaign, verdicts[0], verdicts[1:], before, after, steps[:kept], withdrawn, advice, said,
                       known_together(in_force, inference.exploration.library), tuple(suspects), errors, inference,
                       missing)  # fmt: skip
