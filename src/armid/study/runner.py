@@ -4,7 +4,7 @@ import json
 import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import partial
@@ -162,12 +162,10 @@ def run(
             if counts.missing:
                 width = min(jobs or cpu_count(), counts.missing)
                 pool = LocalPool(width, setup) if dask is None else DaskPool(dask, setup)
-                try:
+                with closing(pool):
                     for outcome in _performed(store, pool, interrupted):
                         finished, simulations = finished + 1, simulations + outcome.used
                         progress(counts, outcome)
-                finally:
-                    pool.close()
             return Ending(
                 study, folder, store.counts(), finished, simulations, time.monotonic() - began, interrupted(),
                 store.first_error(),
