@@ -15,16 +15,21 @@ from armid.report.html import html
 from armid.report.result import NewFiles
 from armid.report.style import pyplot
 from armid.study.analyses.analysis import Evidence, wide_runs
-from armid.study.analyses.answer import answer_of
-from armid.study.analyses.convergence import ANYTIME, CONVERGENCE
+from armid.study.analyses.convergence import ANYTIME, BEST_FITNESS, CONVERGENCE, RUNNING_TIME, SUCCESS
 from armid.study.analyses.cramer_rao import CRAMER_RAO
-from armid.study.analyses.errors import ERRORS
-from armid.study.analyses.fitness_quality import FITNESS_QUALITY
-from armid.study.analyses.overview import OVERVIEW, RUNS_ANALYSIS, campaigns, counted, loop_runs, main_table, verdicts
+from armid.study.analyses.errors import ERRORS, FITNESS_QUALITY
+from armid.study.analyses.overview import (
+    OVERVIEW,
+    RUNS_ANALYSIS,
+    answer_of,
+    campaigns,
+    counted,
+    loop_runs,
+    main_table,
+    verdicts,
+)
+from armid.study.analyses.paper_tables import TABLE1, TABLE2
 from armid.study.analyses.ranks import BY_CLASS, RANKS, class_ranks
-from armid.study.analyses.success import BEST_FITNESS, RUNNING_TIME, SUCCESS
-from armid.study.analyses.table1 import TABLE1
-from armid.study.analyses.table2 import TABLE2
 from armid.study.results import StudyResults
 from armid.study.spec import CLOSES_LOOP, IDENTIFIES, KIND_NAMES
 from armid.units import DEG, angles_in
