@@ -61,11 +61,11 @@ def as_identifier(name: str, obj: Any) -> Identifier:
         "searches by itself, whose first argument is `value`"
     )
     if isinstance(obj, Algorithm) and obj.problem is None:
-        return Identifier(name, partial(copied, obj), "an algorithm of the user")
+        return Identifier(name, lambda budget: deepcopy(obj), "an algorithm of the user")
     if isinstance(obj, Algorithm):
         raise ArmidError(f"identifier '{name}' is a {type(obj).__name__} that was used already, {expected}")
     if isinstance(obj, type) and issubclass(obj, Algorithm) and accepts(obj):
-        return Identifier(name, partial(without_budget, obj), "a class of the user")
+        return Identifier(name, lambda budget: obj(), "a class of the user")
     if callable(obj) and not isinstance(obj, type) and "value" in arguments_of(obj):
         needed = [argument for argument, p in arguments_of(obj).items() if p.default is p.empty]
         refuse_unknown(needed, SEARCH_ARGUMENTS, f"what is given to a search such as '{name}'")
@@ -74,14 +74,6 @@ def as_identifier(name: str, obj: Any) -> Identifier:
     if callable(obj) and not isinstance(obj, type) and accepts(obj, 1):
         return Identifier(name, partial(built, name, obj), "a function of the user")
     raise ArmidError(f"identifier '{name}' is {obj!r}, {expected}")
-
-
-def copied(algorithm: Algorithm, budget: int) -> Algorithm:
-    return deepcopy(algorithm)
-
-
-def without_budget(algorithm: type[Algorithm], budget: int) -> Algorithm:
-    return algorithm()
 
 
 def built(name: str, factory: Callable[[int], Algorithm], budget: int) -> Algorithm:

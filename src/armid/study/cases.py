@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from armid.engine import FINE, Schedule, calibrate, simulate
-from armid.errors import ArmidError, quoted
+from armid.errors import ArmidError, located, quoted
 from armid.estimation.least_squares import with_fitted_starts
 from armid.model import Manoeuvre, Model, Plant
 from armid.problem.problem import Replay, replays
@@ -145,10 +145,8 @@ def _space(
     own_bounds, own_fixed = (entry.bounds, entry.fixed) if entry else ({}, {})
     fixed = {name: v for name, v in spec.fixed.items() if name not in own_bounds} | dict(own_fixed)
     bounds = {name: b for name, b in spec.bounds.items() if name not in own_fixed} | dict(own_bounds)
-    try:
+    with located(where):
         return space_of(model, overrides, bounds, fixed)
-    except ArmidError as error:
-        raise ArmidError(f"{where}: {error}") from error
 
 
 def _campaign_case(
@@ -179,10 +177,8 @@ def campaign_folder(folder: Path, campaign: str, where: str) -> Path:
     ):
         raise ArmidError(f"{where}: campaign {quoted(campaign)} leads out of the folder of the study, a folder inside "
                          "is expected")  # fmt: skip
-    try:
+    with located(where):
         toml = campaign_path(path)
-    except ArmidError as error:
-        raise ArmidError(f"{where}: {error}") from error
     if toml.name != CAMPAIGN_FILE:
         raise ArmidError(
             f"{where}: campaign {quoted(campaign)} is a file: a folder that holds {CAMPAIGN_FILE} is expected"

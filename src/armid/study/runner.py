@@ -12,7 +12,7 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armid.errors import ArmidError, MachineError, StudyError, caused_by, nearest
+from armid.errors import ArmidError, StudyError, caused_by, located, nearest
 from armid.estimation.identify import ctrl_c_waits
 from armid.progress import announced, console
 from armid.report.result import refuse_unwritable
@@ -133,12 +133,8 @@ def run(
     if not 0.0 < time_limit < 1e9:
         raise ArmidError(f"the time limit is {time_limit:g}, a number of seconds above 0 is expected")
     setup = WorkerSetup(study.kind, study.registry.plugins, study.folder, time_limit)
-    try:
+    with located(file):
         study.check(partial(performed_apart, setup))
-    except MachineError:
-        raise
-    except ArmidError as error:
-        raise ArmidError(f"{file}: {error}") from error
     folder, named = OUT / study.name if out is None else Path(out), Path(file)
     # a whole path says something on this machine alone
     told = named.name if named.is_absolute() else named.as_posix()

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from armid.engine.calibrate import ALLOWED
-from armid.errors import ArmidError, MachineError
+from armid.errors import MachineError, located
 from armid.model import Model
 from armid.record.schema import (
     CONSTANTS_KEY,
@@ -386,10 +386,8 @@ class StudyRegistry(Registry):
     digests: Mapping[tuple[str, str], str] = field(default_factory=dict)
 
     def identifier(self, name: str, where: str) -> Any:
-        try:
+        with located(where):
             return self.identifier_of(name)
-        except ArmidError as error:
-            raise ArmidError(f"{where}: {error}") from error
 
     def with_effects(self, model: Model, names: Iterable[str], where: str) -> Model:
         known = self.effects_for(model.plant)

@@ -7,7 +7,7 @@ import sqlite3
 import time
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -371,21 +371,13 @@ def check_format(connection: sqlite3.Connection, path: Path, may_be_new: bool = 
 @contextmanager
 def transaction(connection: sqlite3.Connection) -> Iterator[None]:
     """Do all or nothing; other writers wait from the beginning on."""
-    connection.execute("BEGIN IMMEDIATE")
-    try:
+    with connection:
+        connection.execute("BEGIN IMMEDIATE")
         yield
-        connection.execute("COMMIT")
-    except BaseException:
-        # SQLite has rolled back by itself after some errors, such as a full disk
-        with suppress(sqlite3.Error):
-            connection.execute("ROLLBACK")
-        raise
 
 
 def closed(connection: sqlite3.Connection) -> None:
     """Close a connection; the last one leaves a single file that can be read in any place, also a read-only one."""
-    with suppress(sqlite3.Error):
+    with suppress(sqlite3.Error), closing(connection):
         connection.execute("PRAGMA busy_timeout = 0")
         connection.execute("PRAGMA journal_mode = DELETE")
-    with suppress(sqlite3.Error):
-        connection.close()

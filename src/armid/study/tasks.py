@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from armid.errors import ArmidError, MachineError, StudyError, caused_by, quoted
+from armid.errors import ArmidError, MachineError, StudyError, caused_by, located, quoted
 from armid.estimation.identify import WAS_INTERRUPTED, Identification, identified, versions_of
 from armid.identifiers import options_of
 from armid.model import Model
@@ -397,14 +397,12 @@ def _check_built(entry: EntrySpec, registry: StudyRegistry, where: str) -> None:
     """
     identifier = registry.identifier(entry.name, where)
     asked = [lookup(registry.fitness, fitness.partition(":")[0], "fitness", where) for fitness in entry.fitness]
-    try:
+    with located(where):
         for fitness in asked:
             identifier.refuse(fitness)
         built = identifier.with_options(entry.options)
         if not registry.digests_of("identifiers", entry.name):
             built.build(entry.largest_budget)
-    except ArmidError as error:
-        raise ArmidError(f"{where}: {error}") from error
 
 
 def _check_noise(entry: EntrySpec, cases: Sequence[Case], registry: StudyRegistry, where: str) -> None:
