@@ -283,8 +283,7 @@ def _random_cases(spec: StudySpec, model: Model, folder: Path, where: str) -> li
     whole = space.complete(low + (high - low) * (wanted.margin + (1.0 - 2.0 * wanted.margin) * points))
     truths = [dict(zip(space.names, row.tolist(), strict=True)) for row in whole]
     first = _simulated_case(Case("", model, space, truths[0]), wanted.manoeuvres, spec, folder, where)
-    names = [f"random {i:0{len(str(n))}d}" for i in range(1, n + 1)]
-    return [replace(first, name=name, truth=_completed(t, model, where)) for name, t in zip(names, truths, strict=True)]
+    return [replace(first, name=f"random {i:0{len(str(n))}d}", truth=truth) for i, truth in enumerate(truths, 1)]
 
 
 def clean_records(settings: Mapping[str, Any], model: Model) -> tuple[Record, ...]:

@@ -149,7 +149,8 @@ def report_of(
         with angles_in(angle):
             evidence = Evidence(results)
             analyses = OF_SUITES if evidence.is_suite else ANALYSES
-            sections = [Section(a.title, tuple(map(evidence.apart, a.parts(evidence)))) for a in analyses]
+            sections = [Section(a.title, tuple(map(evidence.apart, a.parts(evidence)))) for a in analyses
+                        if a.applies(evidence)]  # fmt: skip
             facts, runs, answer = facts_of(evidence), wide_runs(evidence), answer_of(evidence, sections[0].parts[0])
     shown = (*(s for s in sections if s.parts), *own_sections(own, runs), made_section(results, again))
     state = state_of(study)

@@ -18,8 +18,9 @@ import pandas as pd
 from armid.errors import ArmidError, StudyError, caused_by, nearest
 from armid.report.result import NewFiles, Shown
 from armid.study.store import (
-    DONE,
+    EVERY_RUN,
     FILE_NAME,
+    TALLY,
     WAIT_S,
     RunTrace,
     check_format,
@@ -183,11 +184,8 @@ def load_study(path: str | Path) -> StudyResults:
         if row is None:
             raise ArmidError(f"{file} holds no study yet: let `armid study` begin it")
         study = json.loads(row[0])
-        status = "SELECT status, count(*) FROM plan JOIN runs USING (run) GROUP BY status"
-        ended = dict(connection.execute(status).fetchall())
-        study["n_planned"] = connection.execute("SELECT count(*) FROM plan").fetchone()[0]
-        study["n_done"] = ended.get(DONE, 0)
-        study["n_failed"] = sum(ended.values()) - study["n_done"]
+        planned, ended, failed = connection.execute(TALLY, EVERY_RUN).fetchone()
+        study |= {"n_planned": planned, "n_done": ended - failed, "n_failed": failed}
         study |= {"versions": _versions(connection), "folder": str(file.parent)}
         study["parameters"] = list(dict.fromkeys(str(name) for case in study["cases"] for name in case["bounds"]))
         parameters = _parameters(connection, study)
@@ -232,11 +230,9 @@ def _parameters(connection: sqlite3.Connection, study: dict[str, Any]) -> pd.Dat
 
 def _versions(connection: sqlite3.Connection) -> dict[str, str]:
     query = "SELECT DISTINCT t.text FROM plan JOIN runs r USING (run) JOIN texts t ON t.hash = r.versions"
-    versions: dict[str, list[str]] = {}
-    for (text,) in connection.execute(query):
-        for package, version in json.loads(text).items():
-            versions.setdefault(package, []).append(version)
-    return {package: ", ".join(sorted(set(those))) for package, those in versions.items()}
+    of_runs: list[dict[str, str]] = [json.loads(text) for (text,) in connection.execute(query)]
+    packages = dict.fromkeys(package for versions in of_runs for package in versions)
+    return {package: ", ".join(sorted({v[package] for v in of_runs if package in v})) for package in packages}
 
 
 @contextmanager

@@ -155,6 +155,7 @@ CHOSEN = f"""
 (p."case" = :case OR p."case" GLOB :case) AND (p.identifier = :identifier OR p.identifier GLOB :identifier
 OR p.identifier || '{ON}' || p.fitness GLOB :identifier)
 """
+EVERY_RUN = {"case": "*", "identifier": "*"}
 MISSING = f"""
 SELECT p.place, p.run, s.settings FROM plan p JOIN settings s USING (run)
 WHERE p.place > :after AND {CHOSEN} AND NOT EXISTS (SELECT 1 FROM runs r WHERE r.run = p.run) ORDER BY p.place LIMIT :n

@@ -130,12 +130,13 @@ PARAMETER, N_RUNS = Column("parameter", "parameter"), Column("n", "runs", ".0f")
 
 @dataclass(frozen=True)
 class Analysis:
-    """One section of the report of a study, and a line of `armid list analyses`; no parts where it does not apply."""
+    """One section of the report of a study, and a line of `armid list analyses`; nothing where it has no parts."""
 
     name: str
     title: str
     parts: Callable[["Evidence"], Sequence[Part]]
     note: str
+    applies: Callable[["Evidence"], bool] = lambda evidence: True
 
 
 class Evidence:
@@ -206,6 +207,10 @@ class Evidence:
     @property
     def knows_truth(self) -> bool:
         return bool(self.parameters["truth"].notna().any())
+
+    @property
+    def has_results(self) -> bool:
+        return not self.parameters.empty
 
     @cached_property
     def groups(self) -> dict[str, dict[str, NDArray[np.intp]]]:

@@ -45,15 +45,9 @@ ECDF_CAPTION = (
 )
 
 
-def success_parts(evidence: Evidence) -> Sequence[Part]:
-    if not evidence.knows_truth:
-        return ()
-    return (success(concat([evidence.of(setting) for setting in evidence.settings])),)
-
-
-SUCCESS = Analysis(
-    "success", "Success rates", success_parts, "share of runs with all parameters within 1, 0.1 and 0.01 %"
-)
+SUCCESS = Analysis("success", "Success rates", lambda evidence: (
+    success(concat([evidence.of(setting) for setting in evidence.settings])),
+), "share of runs with all parameters within 1, 0.1 and 0.01 %", lambda evidence: evidence.knows_truth)  # fmt: skip
 
 
 def success(runs: DataFrame) -> Table:
@@ -78,8 +72,6 @@ def success(runs: DataFrame) -> Table:
 
 
 def running_time_parts(evidence: Evidence) -> Sequence[Part]:
-    if not evidence.knows_truth:
-        return ()
     shown = {f"{100 * t:g} %": t for t in SUCCESS_TOLERANCES}
     title = "Expected running time to the truth [simulations]"
     return (
@@ -88,9 +80,8 @@ def running_time_parts(evidence: Evidence) -> Sequence[Part]:
     )
 
 
-RUNNING_TIME = Analysis(
-    "running_time", "Cost of the truth", running_time_parts, "simulations until the parameters are right"
-)
+RUNNING_TIME = Analysis("running_time", "Cost of the truth", running_time_parts,
+                        "simulations until the parameters are right", lambda e: e.knows_truth)  # fmt: skip
 
 
 def share_hit(hits: Array, grid: ArrayLike) -> Array:
@@ -163,8 +154,6 @@ WATERFALL_CAPTION = "What a run leaves of the way to the best fitness, sorted. A
 
 
 def best_fitness_parts(evidence: Evidence) -> Sequence[Part]:
-    if evidence.parameters.empty:
-        return ()
     shown = {f"{t:g} left": t for t in SHARES_LEFT}
     title = "Expected running time to the best known fitness [simulations]"
     return (
@@ -173,9 +162,8 @@ def best_fitness_parts(evidence: Evidence) -> Sequence[Part]:
     )
 
 
-BEST_FITNESS = Analysis(
-    "best_fitness", "Cost of the best fitness", best_fitness_parts, "simulations until the fitness is best"
-)
+BEST_FITNESS = Analysis("best_fitness", "Cost of the best fitness", best_fitness_parts,
+                        "simulations until the fitness is best", lambda e: e.has_results)  # fmt: skip
 
 
 def waterfall_figure(evidence: Evidence) -> Any:
@@ -200,8 +188,6 @@ FITNESS_CAPTION = "Smallest value of {fitness} so far against simulations: media
 
 
 def convergence_parts(evidence: Evidence) -> Sequence[Part]:
-    if evidence.parameters.empty:
-        return ()
     kept, figures = evidence.histories, []
     if evidence.knows_truth:
         mask = np.ones(len(evidence.runs), bool)
@@ -218,7 +204,8 @@ def convergence_parts(evidence: Evidence) -> Sequence[Part]:
     return figures
 
 
-CONVERGENCE = Analysis("convergence", "Convergence", convergence_parts, "error and fitness against simulations")
+CONVERGENCE = Analysis("convergence", "Convergence", convergence_parts, "error and fitness against simulations",
+                       lambda e: e.has_results)  # fmt: skip
 
 
 def median(held_values: Array) -> Array:
@@ -261,13 +248,10 @@ AREA_CAPTION = (
 )
 
 
-def anytime_parts(evidence: Evidence) -> Sequence[Part]:
-    if not evidence.is_suite or evidence.parameters.empty:
-        return ()
-    return areas(evidence), Figure("attained", "Targets hit at any time", ATTAINED_CAPTION, lambda: attained(evidence))
-
-
-ANYTIME = Analysis("anytime", "At any time", anytime_parts, "area over the convergence curve, empirical attainment")
+ANYTIME = Analysis("anytime", "At any time", lambda evidence: (
+    areas(evidence),
+    Figure("attained", "Targets hit at any time", ATTAINED_CAPTION, lambda: attained(evidence)),
+), "area over the convergence curve, empirical attainment", lambda e: e.is_suite and e.has_results)  # fmt: skip
 
 
 def area_over_curve(hits: Array, budget: Array) -> Array:

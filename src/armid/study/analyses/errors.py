@@ -47,8 +47,6 @@ VALLEY_CAPTION = (
 
 
 def error_parts(evidence: Evidence) -> Sequence[Part]:
-    if not evidence.knows_truth:
-        return ()
     maps = {s: error_map(evidence.of(s), evidence.best_first, evidence.cases) for s in evidence.settings}
     figures = [Figure("error_map", "Errors by identifier and case", MAP_CAPTION, lambda: error_map_figure(maps))]
     ends = end_points(evidence.estimates)
@@ -60,7 +58,8 @@ def error_parts(evidence: Evidence) -> Sequence[Part]:
     return figures
 
 
-ERRORS = Analysis("errors", "Where the errors are", error_parts, "largest error by identifier and case; where runs end")
+ERRORS = Analysis("errors", "Where the errors are", error_parts,
+                  "largest error by identifier and case; where runs end", lambda e: e.knows_truth)  # fmt: skip
 
 
 def error_map(runs: DataFrame, variants: Sequence[str], cases: Sequence[str]) -> DataFrame:
@@ -203,16 +202,12 @@ FITNESS_FIGURE_CAPTION = (
 )
 
 
-def fitness_parts(evidence: Evidence) -> Sequence[Part]:
-    if evidence.runs["fitness"].nunique() < 2 or not evidence.knows_truth:
-        return ()
-    figure = Figure("fitness", "Errors by fitness", FITNESS_FIGURE_CAPTION,
-                    lambda: fitness_quality_figure(evidence.runs, evidence.colours))  # fmt: skip
-    return fitness_quality(evidence.runs), figure
-
-
-FITNESS_QUALITY = Analysis("fitness_quality", "Which fitness gives right parameters", fitness_parts,
-                           "error against similarity, for each fitness")  # fmt: skip
+FITNESS_QUALITY = Analysis("fitness_quality", "Which fitness gives right parameters", lambda evidence: (
+    fitness_quality(evidence.runs),
+    Figure("fitness", "Errors by fitness", FITNESS_FIGURE_CAPTION,
+           lambda: fitness_quality_figure(evidence.runs, evidence.colours)),
+), "error against similarity, for each fitness",
+    lambda evidence: evidence.knows_truth and evidence.runs["fitness"].nunique() > 1)  # fmt: skip
 
 
 def fitness_quality(runs: DataFrame) -> Table:

@@ -236,17 +236,15 @@ TABLE2_FIGURE_CAPTION = (
 
 def table2_parts(evidence: Evidence) -> Sequence[Part]:
     estimates, published = evidence.estimates, evidence.published
-    if evidence.study.get("report") != "table2" or estimates.empty:
-        return ()
     figure = Figure("table2", "Repeated identifications beside the paper's", TABLE2_FIGURE_CAPTION,
                     lambda: table2_figure(estimates, published, evidence.colours))  # fmt: skip
     layout = paper_layout(evidence, "Table II", with_truth=False)
     return layout, table2(estimates, published), figure
 
 
-TABLE2 = Analysis(
-    "table2", "Table II of the paper beside ours", table2_parts, "mean and spread, where the study asks for it"
-)
+TABLE2 = Analysis("table2", "Table II of the paper beside ours", table2_parts,
+                  "mean and spread, where the study asks for it",
+                  lambda e: e.study.get("report") == "table2" and not e.estimates.empty)  # fmt: skip
 
 
 def table2(estimates: DataFrame, published: DataFrame) -> Table:
