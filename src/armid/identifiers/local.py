@@ -160,7 +160,8 @@ class ByValues(SearchOptions):
         calls = Calls(value)
         search.set_min_objective(calls)
         try:
-            optimised(search, start, calls)
+            with calls.raised_again(), suppress(*NO_PROGRESS):
+                search.optimize(start)
         finally:
             # the frames of the error hold NLopt's object and that holds the calls: a reference cycle through NLopt,
             # which the garbage collector cannot find
@@ -194,17 +195,3 @@ NLOPT = tuple(
              uses_gradient=algorithm.startswith("LD_"))
     for name, (note, algorithm) in ALGORITHMS.items()
 )  # fmt: skip
-
-
-def optimised(search: nlopt.opt, start: Array, calls: Calls) -> None:
-    """Let NLopt run, and raise what a call raised, however NLopt took it."""
-    try:
-        with suppress(*NO_PROGRESS):
-            search.optimize(start)
-    except SystemError:
-        # BOBYQA, stopped in a step that it tries once more, returns a result all the same; Python, which finds a
-        # result and an error, raises this in place of the error
-        if calls.error is None:
-            raise
-    if calls.error is not None:
-        raise calls.error

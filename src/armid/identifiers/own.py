@@ -103,14 +103,8 @@ def search_by(function: Callable[..., Any], options: Mapping[str, Any], task: Se
     start = cube.candidates(cube.first(task))[0] if task.start is None else task.start
     given = {"value": value, "low": low.copy(), "high": high.copy(), "budget": task.budget, "random": task.random,
              "start": start.copy()}  # fmt: skip
-    try:
+    with value.ask.raised_again():
         function(**{key: given[key] for key in arguments_of(function) if key in given}, **options)
-    except Exception:
-        # compiled libraries turn an error of a call into one of their own
-        if value.ask.error is None:
-            raise
-    if value.ask.error is not None:
-        raise value.ask.error
 
 
 class Value:
