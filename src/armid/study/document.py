@@ -18,16 +18,7 @@ from armid.study.analyses.analysis import Evidence, wide_runs
 from armid.study.analyses.convergence import ANYTIME, BEST_FITNESS, CONVERGENCE, RUNNING_TIME, SUCCESS
 from armid.study.analyses.cramer_rao import CRAMER_RAO
 from armid.study.analyses.errors import ERRORS, FITNESS_QUALITY
-from armid.study.analyses.overview import (
-    OVERVIEW,
-    RUNS_ANALYSIS,
-    answer_of,
-    campaigns,
-    counted,
-    loop_runs,
-    main_table,
-    verdicts,
-)
+from armid.study.analyses.overview import OVERVIEW, RUNS_ANALYSIS, answer_of, loop_runs, loop_tables, main_table
 from armid.study.analyses.paper_tables import TABLE1, TABLE2
 from armid.study.analyses.ranks import BY_CLASS, RANKS, class_ranks
 from armid.study.results import StudyResults
@@ -143,8 +134,9 @@ def report_of(
     answer: tuple[str, ...]
     if closes_loops:
         runs = loop_runs(results.loops)
-        sections = [Section("Verdicts", (verdicts(runs),)), Section("Campaigns", (campaigns(runs),))]
-        facts, answer = loop_facts(study, scored=key is not None or bool(study["key"])), (counted(runs),)
+        sentence, verdicts, campaigns = loop_tables(runs)
+        sections = [Section("Verdicts", (verdicts,)), Section("Campaigns", (campaigns,))]
+        facts, answer = loop_facts(study, scored=key is not None or bool(study["key"])), (sentence,)
     else:
         with angles_in(angle):
             evidence = Evidence(results)
@@ -169,8 +161,8 @@ def summary_of(results: StudyResults) -> Document:
             main = class_ranks(evidence) if evidence.is_suite else main_table(evidence)
             main, answer = evidence.apart(main), answer_of(evidence, main)
     else:
-        runs = loop_runs(results.loops)
-        main, answer = verdicts(runs), (counted(runs),)
+        sentence, main, _ = loop_tables(loop_runs(results.loops))
+        answer = (sentence,)
     return Document(results.study["name"], "Study", str(results.study.get("question", "")),
                     (*answer, state_of(results.study)), (), main=(main,))  # fmt: skip
 

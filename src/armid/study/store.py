@@ -3,13 +3,15 @@
 import hashlib
 import json
 import os
+import shutil
 import sqlite3
 import time
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import closing, contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -337,6 +339,35 @@ def opened(path: Path) -> sqlite3.Connection:
             connection.close()
             raise
     return connection
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[sqlite3.Connection]:
+    """Give a connection that cannot write, and tell in one sentence what cannot be read.
+
+    A store whose runner was killed has a log in its folder. In a read-only folder both are copied to be read.
+    """
+    with translate_errors(path), ExitStack() as stack:
+        uri = f"{path.resolve().as_uri()}?mode=ro"
+        connection = stack.enter_context(closing(connected(uri, uri=True, timeout=WAIT_S)))
+        try:
+            check_format(connection, path)
+        except sqlite3.OperationalError as error:
+            if not error.sqlite_errorname.startswith(("SQLITE_CANTOPEN", "SQLITE_READONLY")):
+                raise
+            beside = stack.enter_context(TemporaryDirectory(prefix="armid-"))
+            for file in path.parent.glob(f"{path.name}*"):
+                shutil.copy(file, beside)
+            connection = stack.enter_context(closing(connected(Path(beside) / path.name)))
+            check_format(connection, path)
+        try:
+            yield connection
+        except (ValueError, TypeError, KeyError, AttributeError, zlib.error) as error:
+            if isinstance(error, ArmidError):
+                raise
+            raise ArmidError(
+                f"{path} is damaged: what it holds cannot be read, what armid wrote is expected"
+            ) from error
 
 
 def keep_log(connection: sqlite3.Connection) -> None:

@@ -264,6 +264,13 @@ class Evidence:
         own = [v for v in self.variants if is_swarm(v)]
         return own + [v for v in self.best_first if v not in own][:MOST_OTHERS]
 
+    def scale_of_fitness(self, name: str) -> tuple[str, float]:
+        """Return the unit of a fitness as it is written behind its name, and its factor from SI."""
+        if name not in FITNESS or FITNESS[name].unit != "signal":
+            return "", 1.0
+        unit, factor = scale_of(self.unit)
+        return f" [{unit}]", factor
+
     def of(self, setting: str) -> DataFrame:
         return self.runs[self.runs["setting"] == setting]
 
@@ -343,14 +350,6 @@ def noise_text(level: float, unit: str = SPEED_UNIT) -> str:
     if np.isnan(level):
         return "as recorded"
     return WITHOUT_NOISE if level == 0.0 else f"{level:g} {NOISES[unit].replace('_s', '/s')}"
-
-
-def fitness_scale(name: str, unit: str) -> tuple[str, float]:
-    """Return the unit of a fitness as it is written behind its name, and its factor from SI; unit: of the records."""
-    if name not in FITNESS or FITNESS[name].unit != "signal":
-        return "", 1.0
-    shown_unit, factor = scale_of(unit)
-    return f" [{shown_unit}]", factor
 
 
 def ordered(runs: DataFrame, study: dict[str, Any]) -> DataFrame:

@@ -13,16 +13,7 @@ from pandas import DataFrame, concat
 
 from armid.report.document import Column, Figure, Part, Table, slug
 from armid.report.style import LEAST_HEIGHT, named_lines, panels
-from armid.study.analyses.analysis import (
-    BUDGET_COLUMN,
-    N_RUNS,
-    SETTING,
-    TARGETS,
-    VARIANT,
-    Analysis,
-    Evidence,
-    fitness_scale,
-)
+from armid.study.analyses.analysis import BUDGET_COLUMN, N_RUNS, SETTING, TARGETS, VARIANT, Analysis, Evidence
 
 Array = NDArray[np.floating[Any]]
 PAIRS_HIT = "share of (run, target) pairs hit"
@@ -196,7 +187,7 @@ def convergence_parts(evidence: Evidence) -> Sequence[Part]:
     names = list(dict.fromkeys(map(str, evidence.runs["fitness"])))
     for name in names:
         own = (evidence.runs["fitness"] == name).to_numpy()
-        unit, factor = fitness_scale(name, evidence.unit)
+        unit, factor = evidence.scale_of_fitness(name)
         label = f"best fitness ({name}{unit})"
         draw = partial(convergence_figure, evidence, own, factor * kept.values, label, LEAST_FITNESS)
         file = slug("convergence", name) if len(names) > 1 else "convergence_fitness"

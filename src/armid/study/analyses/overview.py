@@ -11,17 +11,7 @@ import numpy as np
 from pandas import DataFrame, Series, concat, factorize
 
 from armid.report.document import Column, Table, listed
-from armid.study.analyses.analysis import (
-    N_RUNS,
-    PAPER,
-    PARAMETER,
-    SETTING,
-    VARIANT,
-    Analysis,
-    Evidence,
-    fitness_scale,
-    is_swarm,
-)
+from armid.study.analyses.analysis import N_RUNS, PAPER, PARAMETER, SETTING, VARIANT, Analysis, Evidence, is_swarm
 from armid.study.analyses.ranks import HALF, alike_text, arrived_text, compared, suite_answer
 from armid.units import scale_of
 
@@ -169,20 +159,15 @@ def over_noise(report: Mapping[str, Any], when: str) -> float:
     return np.nan if error is None else float(error["rmse"] / report["noise_rms"])
 
 
-def verdicts(runs: DataFrame) -> Table:
-    frame = runs.groupby(["verdict", "effects"]).size().rename("n").reset_index()
-    return Table("verdicts", "What was found", VERDICTS_CAPTION, frame, VERDICTS_COLUMNS, grouped=True)
-
-
-def campaigns(runs: DataFrame) -> Table:
-    return Table("campaigns", "Campaigns", CAMPAIGNS_CAPTION, runs, CAMPAIGNS_COLUMNS)
-
-
-def counted(runs: DataFrame) -> str:
-    if runs.empty:
-        return "No campaign was closed."
+def loop_tables(runs: DataFrame) -> tuple[str, Table, Table]:
+    """Return the answer of a study that closes loops, and the tables of what was found and of its campaigns."""
     counts = [f"{n} {str(verdict).replace('_', ' ')}" for verdict, n in runs["verdict"].value_counts().items()]
-    return f"Of {len(runs)} campaigns: {', '.join(counts)}."
+    found = runs.groupby(["verdict", "effects"]).size().rename("n").reset_index()
+    return (
+        f"Of {len(runs)} campaigns: {', '.join(counts)}." if counts else "No campaign was closed.",
+        Table("verdicts", "What was found", VERDICTS_CAPTION, found, VERDICTS_COLUMNS, grouped=True),
+        Table("campaigns", "Campaigns", CAMPAIGNS_CAPTION, runs, CAMPAIGNS_COLUMNS),
+    )
 
 
 # The answer names so many settings; the table holds all.
@@ -337,7 +322,7 @@ def lowest_fitness(evidence: Evidence) -> str:
     if done.empty:
         return "No run has a result."
     medians = done.groupby(["fitness", "variant"], sort=False)["value"].median()
-    scales = {f: fitness_scale(str(f), evidence.unit) for f in dict.fromkeys(done["fitness"])}
+    scales = {f: evidence.scale_of_fitness(str(f)) for f in dict.fromkeys(done["fitness"])}
     said = [f"{medians.loc[f].idxmin()}, {factor * medians.loc[f].min():.6g} of {f}{unit}"
             for f, (unit, factor) in scales.items()]  # fmt: skip
     return f"No truth is known. Lowest median fitness: {'; '.join(said)}."
