@@ -7,15 +7,7 @@ import nlopt
 import numpy as np
 
 from armid.identifiers.identifier import RANGE, declared, option, share
-from armid.identifiers.search import (
-    LARGEST_SEED,
-    Calls,
-    Height,
-    NoFitnessError,
-    SearchOptions,
-    SearchTask,
-    local_search,
-)
+from armid.identifiers.search import Calls, Height, NoFitnessError, SearchOptions, SearchTask, local_search, seed_from
 from armid.model import Array
 
 FORWARD, CENTRAL = "forward", "central"
@@ -133,7 +125,7 @@ class ByValues(SearchOptions):
 
     def search(self, task: SearchTask) -> None:
         """Descend from the task's start, or from random ones until one has a fitness."""
-        seed = int(task.random.integers(1, LARGEST_SEED))
+        seed = seed_from(task.random)
         local_search(task, lambda start: self.descend(task, seed, start))
 
     def descend(self, task: SearchTask, seed: int, start: Array) -> None:

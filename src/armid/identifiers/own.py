@@ -18,7 +18,7 @@ from pymoo.core.algorithm import Algorithm
 
 from armid.errors import ArmidError
 from armid.identifiers.identifier import Identifier, accepts, declared, option, refuse_unknown
-from armid.identifiers.search import LARGEST_SEED, Asker, Calls, SearchAlgorithm, SearchOptions, SearchTask
+from armid.identifiers.search import Asker, Calls, SearchAlgorithm, SearchOptions, SearchTask, seed_from
 from armid.model import Array
 from armid.problem.meter import PENALTY
 
@@ -155,7 +155,7 @@ class Lshade(Foreign):
         n_candidates = max(4, min(round(self.per_parameter * low.size), budget // 10))
         options = {"population_size": n_candidates, "memory_size": self.memory, "x_tol": 0.0}
         box = list(zip(low.tolist(), high.tolist(), strict=True))
-        LSHADE(value, box, None, budget, None, int(random.integers(1, LARGEST_SEED)), options).optimize()
+        LSHADE(value, box, None, budget, None, seed_from(random), options).optimize()
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,7 @@ class Ngopt(Foreign):
 
         # nevergrad 1.0.12 makes a number of an array of one, which numpy 2.4 refuses
         vars(metamodel).setdefault("float", lambda number: float(np.asarray(number).item()))
-        seed, point = int(random.integers(1, LARGEST_SEED)), ng.p.Array(shape=low.shape, lower=0.0, upper=1.0)
+        seed, point = seed_from(random), ng.p.Array(shape=low.shape, lower=0.0, upper=1.0)
         point.random_state, before = np.random.RandomState(seed), set(threading.enumerate())
         # some of its methods draw from the global generators all the same
         with global_generators(seed), warnings.catch_warnings():
@@ -223,7 +223,7 @@ class Tpe(Foreign):
 
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
-            seed = int(random.integers(1, LARGEST_SEED))
+            seed = seed_from(random)
             sampler = optuna.samplers.TPESampler(seed=seed, multivariate=True, n_startup_trials=self.n_first)
         optuna.logging.set_verbosity(optuna.logging.WARNING)
         study = optuna.create_study(sampler=sampler)

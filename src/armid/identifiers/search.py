@@ -97,6 +97,11 @@ class Cube:
         return task.random.random(self.n) if task.start is None else self.point(task.start)
 
 
+def seed_from(random: np.random.Generator) -> int:
+    """Return a seed for a generator of another library, which takes 31 bits."""
+    return int(random.integers(1, 2**31 - 1))
+
+
 def local_search(task: SearchTask, routine: Callable[[Array], None]) -> None:
     """Run a routine from the task's start, or from points drawn in the box until one of them has a fitness."""
     start = task.cube.first(task)
@@ -171,7 +176,6 @@ def bounds_of(problem: Problem) -> tuple[Array, Array]:
     return problem.xl, problem.xu
 
 
-LARGEST_SEED = 2**31 - 1
 PLAIN = ["F", "G", "H"]
 
 
@@ -305,14 +309,14 @@ def carry_out(algorithm: Algorithm, task: SearchTask, seed: int | None = None) -
     """Search as a fresh algorithm does, from the task's start if it has one; seed: of the run, None in a part of it."""
     if isinstance(algorithm, SearchAlgorithm):
         is_own = algorithm.is_seeded and seed is None
-        random = np.random.default_rng(int(task.random.integers(1, LARGEST_SEED))) if is_own else task.random
+        random = np.random.default_rng(seed_from(task.random)) if is_own else task.random
         algorithm.search(replace(task, random=random, budget=algorithm.budget))
         return
     if isinstance(algorithm, LocalSearch) and task.start is not None:
         algorithm.initialization = Initialization(task.start[np.newaxis])
     elif task.start is not None:
         algorithm.x0 = task.start.copy()
-    seed = int(task.random.integers(1, LARGEST_SEED)) if seed is None else seed
+    seed = seed_from(task.random) if seed is None else seed
     algorithm.setup(task.problem, termination=NoTermination(), seed=seed)
     while algorithm.has_next():
         asked = algorithm.ask()

@@ -24,17 +24,7 @@ from armid.record.record import made_record
 from armid.record.resample import FEWEST_SAMPLES, is_constant, with_window
 from armid.record.schema import RecordSheet, unknown_name, validated
 from armid.study.inputs import input_values, inputs_of
-from armid.study.spec import (
-    NOISES,
-    WHOLE_WINDOW,
-    CaseSpec,
-    ManoeuvreSpec,
-    RandomCasesSpec,
-    StudyRegistry,
-    StudySpec,
-    SuiteSpec,
-    lookup,
-)
+from armid.study.spec import NOISES, CaseSpec, ManoeuvreSpec, RandomCasesSpec, StudyRegistry, StudySpec, SuiteSpec
 from armid.units import DEG, SUFFIXES
 
 MOST_SIMULATED = 10**7
@@ -308,7 +298,7 @@ def clean_records(settings: Mapping[str, Any], model: Model) -> tuple[Record, ..
 
 def in_window(record: Record, window: Sequence[float] | str) -> Record:
     """Return the record in a window [s]; the word for the whole record keeps the window of its file."""
-    if window == WHOLE_WINDOW:
+    if isinstance(window, str):
         return record
     return with_window(record, (float(window[0]), float(window[1])), f"{record.file}, windows_s")
 
@@ -392,15 +382,11 @@ class RunCache:
         return PreparedCase(str(model), space, () if "campaign" in settings else tuple(whole), made)
 
     def _source(self, settings: Mapping[str, Any]) -> tuple[Model, tuple[Record, ...]]:
-        source = settings.get("campaign")
-        if source is None:
-            plant = lookup(self.registry.plants, settings["plant"], "plant", "settings")
-        else:
+        if source := settings.get("campaign"):
             campaign = self._once("campaign", source, lambda: self._campaign(**source))
-            plant = campaign.plant
-        model = self.registry.with_effects(Model(plant), settings["effects"], "settings")
-        if source is not None:
+            model = self.registry.with_effects(Model(campaign.plant), settings["effects"], "settings")
             return model, tuple(r for r in campaign.records if r.file in source["records"])
+        model = self.registry.model(settings["plant"], settings["effects"], "settings")
         parts = {word: settings[word] for word in ("plant", "effects", "truth", "strokes", "interval_s")}
         return model, self._once("clean", parts, lambda: clean_records(settings, model))
 

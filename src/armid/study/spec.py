@@ -383,6 +383,9 @@ class StudyRegistry(Registry):
         with located(where):
             return self.identifier_of(name)
 
+    def model(self, plant: str, effects: Iterable[str], where: str) -> Model:
+        return self.with_effects(Model(lookup(self.plants, plant, "plant", where)), effects, where)
+
     def with_effects(self, model: Model, names: Iterable[str], where: str) -> Model:
         known = self.effects_for(model.plant)
         for name in names:
