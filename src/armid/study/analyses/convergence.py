@@ -62,17 +62,11 @@ def success(runs: DataFrame) -> Table:
     return Table("success", "Success rates", SUCCESS_CAPTION, DataFrame(rows), (SETTING, VARIANT, N_RUNS, *columns))
 
 
-def running_time_parts(evidence: Evidence) -> Sequence[Part]:
-    shown = {f"{100 * t:g} %": t for t in SUCCESS_TOLERANCES}
-    title = "Expected running time to the truth [simulations]"
-    return (
-        running_time(evidence, evidence.histories.error_hits, shown, "running_time", title, TARGET),
-        Figure("ecdf", "ECDF over targets", ECDF_CAPTION, lambda: ecdf_figure(evidence)),
-    )
-
-
-RUNNING_TIME = Analysis("running_time", "Cost of the truth", running_time_parts,
-                        "simulations until the parameters are right", lambda e: e.knows_truth)  # fmt: skip
+RUNNING_TIME = Analysis("running_time", "Cost of the truth", lambda evidence: (
+    running_time(evidence, evidence.histories.error_hits, {f"{100 * t:g} %": t for t in SUCCESS_TOLERANCES},
+                 "running_time", "Expected running time to the truth [simulations]", TARGET),
+    Figure("ecdf", "ECDF over targets", ECDF_CAPTION, lambda: ecdf_figure(evidence)),
+), "simulations until the parameters are right", lambda evidence: evidence.knows_truth)  # fmt: skip
 
 
 def share_hit(hits: Array, grid: ArrayLike) -> Array:
@@ -144,17 +138,11 @@ BEST_TARGET = (
 WATERFALL_CAPTION = "What a run leaves of the way to the best fitness, sorted. A flat step is a local minimum."
 
 
-def best_fitness_parts(evidence: Evidence) -> Sequence[Part]:
-    shown = {f"{t:g} left": t for t in SHARES_LEFT}
-    title = "Expected running time to the best known fitness [simulations]"
-    return (
-        running_time(evidence, evidence.histories.value_hits, shown, "fixed_target", title, BEST_TARGET),
-        Figure("waterfall", "Waterfall of starts", WATERFALL_CAPTION, lambda: waterfall_figure(evidence)),
-    )
-
-
-BEST_FITNESS = Analysis("best_fitness", "Cost of the best fitness", best_fitness_parts,
-                        "simulations until the fitness is best", lambda e: e.has_results)  # fmt: skip
+BEST_FITNESS = Analysis("best_fitness", "Cost of the best fitness", lambda evidence: (
+    running_time(evidence, evidence.histories.value_hits, {f"{t:g} left": t for t in SHARES_LEFT}, "fixed_target",
+                 "Expected running time to the best known fitness [simulations]", BEST_TARGET),
+    Figure("waterfall", "Waterfall of starts", WATERFALL_CAPTION, lambda: waterfall_figure(evidence)),
+), "simulations until the fitness is best", lambda evidence: evidence.has_results)  # fmt: skip
 
 
 def waterfall_figure(evidence: Evidence) -> Any:
