@@ -50,7 +50,7 @@ def caused_by(kind: type[ArmidError]) -> Iterator[None]:
 
 @contextmanager
 def located(where: object) -> Iterator[None]:
-    """Put the place before the sentence of an ArmidError; the machine is at fault wherever it is."""
+    """Put the place before the sentence of an ArmidError; one that says that the machine is at fault has none."""
     try:
         yield
     except MachineError:
