@@ -152,7 +152,7 @@ class ByValues(SearchOptions):
         calls = Calls(value)
         search.set_min_objective(calls)
         try:
-            with calls.raised_again(), suppress(*NO_PROGRESS):
+            with calls, suppress(*NO_PROGRESS):
                 search.optimize(start)
         finally:
             # the frames of the error hold NLopt's object and that holds the calls: a reference cycle through NLopt,

@@ -103,7 +103,7 @@ def search_by(function: Callable[..., Any], options: Mapping[str, Any], task: Se
     start = cube.candidates(cube.first(task))[0] if task.start is None else task.start
     given = {"value": value, "low": low.copy(), "high": high.copy(), "budget": task.budget, "random": task.random,
              "start": start.copy()}  # fmt: skip
-    with value.ask.raised_again():
+    with value.ask:
         function(**{key: given[key] for key in arguments_of(function) if key in given}, **options)
 
 

@@ -4,8 +4,8 @@ Also: the starts of local searches, and what protects the routines of other libr
 """
 
 from abc import abstractmethod
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import inf, isfinite
 from typing import Any, ClassVar, NamedTuple, Protocol
@@ -128,17 +128,14 @@ class Calls:
             self.error = error
             raise
 
-    @contextmanager
-    def raised_again(self) -> Iterator[None]:
-        """Let a library call, and raise what a call raised, however the library took it."""
-        try:
-            yield
-        except Exception:
-            # compiled libraries turn an error of a call into one of their own; where one returns a result all the same,
-            # as BOBYQA stopped in a step that it tries once more, Python raises a SystemError in place of the error
-            if self.error is None:
-                raise
-        if self.error is not None:
+    def __enter__(self) -> None:
+        """Let a library call."""
+
+    def __exit__(self, kind: object, error: BaseException | None, _: object) -> None:
+        """Raise what a call raised, however the library took it."""
+        # compiled libraries turn an error of a call into one of their own; where one returns a result all the same, as
+        # BOBYQA stopped in a step that it tries once more, Python raises a SystemError in place of the error
+        if self.error is not None and (error is None or isinstance(error, Exception)):
             raise self.error
 
 

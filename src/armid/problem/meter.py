@@ -214,12 +214,8 @@ class Metered(Problem):  # type: ignore[misc]
             values = np.where(failed, PENALTY, values)
         if self.meter is not None:
             self.meter.record(asked, values, failed)
-        if granted == len(X):
-            return values, vectors
-        return padded(values, len(X), PENALTY), None if vectors is None else padded(vectors, len(X), np.nan)
-
-
-def padded(values: NDArray[Any], n: int, filler: float) -> NDArray[Any]:
-    longer = np.full((n, *values.shape[1:]), filler, values.dtype)
-    longer[: len(values)] = values
-    return longer
+        beyond = len(X) - granted
+        if beyond:
+            values = np.pad(values, (0, beyond), constant_values=PENALTY)
+            vectors = None if vectors is None else np.pad(vectors, ((0, beyond), (0, 0)), constant_values=np.nan)
+        return values, vectors
