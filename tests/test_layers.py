@@ -170,7 +170,7 @@ def test_exported_functions_tell_every_parameter_and_what_they_return():
 
 
 # What each file of a kind brings under the same name: effects, a statistic, the figures of a page.
-SLOTS = {"EFFECTS", "COLUMNS", "FIGURES", "FIGURE_CAPTION", "TABLE_CAPTION"}
+SLOTS = {"EFFECTS", "FIGURES", "FIGURE_CAPTION"}
 
 
 def constants_of(file):

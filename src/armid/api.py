@@ -13,10 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.errors import ArmidError, DataError, ModelError, nearest, nearest_registered, quoted
-from armid.model import Effect, Manoeuvre, Model, Plant, fitting_form, refusal_of
+from armid.model import Array, Effect, Manoeuvre, Model, Plant, fitting_form, refusal_of
 from armid.model.effects.sensor import sensor_effects
 from armid.model.parameter import warn_if_far
 from armid.progress import announced, search_bar, status_line
@@ -45,7 +44,6 @@ if TYPE_CHECKING:
     FitnessLike: TypeAlias = str | Fitness | Callable[..., Any]
     IdentifierLike: TypeAlias = str | Identifier | Algorithm | Callable[..., Any]
 
-Array = NDArray[np.float64]
 Named: TypeAlias = Iterable[str | Effect] | str | Effect
 Bounds: TypeAlias = Mapping[str, tuple[float, float]]
 Window: TypeAlias = tuple[float, float]

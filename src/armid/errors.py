@@ -48,6 +48,17 @@ def caused_by(kind: type[ArmidError]) -> Iterator[None]:
         raise kind(str(error)).with_traceback(error.__traceback__) from error.__cause__
 
 
+@contextmanager
+def located(where: object) -> Iterator[None]:
+    """Put the place before the sentence of an ArmidError; one that says that the machine is at fault has none."""
+    try:
+        yield
+    except MachineError:
+        raise
+    except ArmidError as error:
+        raise ArmidError(f"{where}: {error}") from error
+
+
 def printable(text: str) -> str:
     r"""Return text on one line that neither steers a terminal nor turns its direction: each such character is escaped.
 

@@ -9,8 +9,7 @@ import pytest
 from made_results import PAPER_CASES
 
 from armid.study.analyses.analysis import Evidence
-from armid.study.analyses.answer import answer_of
-from armid.study.analyses.overview import main_table
+from armid.study.analyses.overview import answer_of, main_table
 from armid.study.analyses.ranks import RANKS, arrived, rank_tests, steps_of, suite_answer, tied
 
 

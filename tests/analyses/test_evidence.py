@@ -15,7 +15,7 @@ from armid.study.analyses.analysis import (
     remaining_share,
     wide_runs,
 )
-from armid.study.analyses.success import SUCCESS_TOLERANCES
+from armid.study.analyses.convergence import SUCCESS_TOLERANCES
 
 
 def test_labels_and_settings_tell_what_differs(made):

@@ -11,7 +11,7 @@ from made_results import PAPER_CASES
 from armid.report.document import Column, table
 from armid.report.files import latex, symbol
 from armid.study.analyses.analysis import Evidence
-from armid.study.analyses.table1 import paper_layout
+from armid.study.analyses.paper_tables import paper_layout
 from armid.study.document import report_of
 
 PREAMBLE = r"""\documentclass{article}

@@ -8,10 +8,16 @@ from made_results import PAPER_CASES, MadeResults
 
 from armid.report.files import markdown
 from armid.study.analyses.analysis import Evidence
-from armid.study.analyses.errors import brief, end_points, error_map, error_map_figure
-from armid.study.analyses.fitness_quality import fitness_quality, fitness_quality_figure
+from armid.study.analyses.convergence import success
+from armid.study.analyses.errors import (
+    brief,
+    end_points,
+    error_map,
+    error_map_figure,
+    fitness_quality,
+    fitness_quality_figure,
+)
 from armid.study.analyses.overview import loop_runs, main_table, reasons, runs_table
-from armid.study.analyses.success import success
 from armid.study.document import report_of, summary_of
 from armid.study.results import load_study
 from armid.study.runner import run_study

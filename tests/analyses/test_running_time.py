@@ -9,10 +9,11 @@ import pytest
 
 from armid.report.style import MOST_COLOURED, PALE, named_lines, panels
 from armid.study.analyses.analysis import TARGETS
-from armid.study.analyses.convergence import convergence_figure, median
-from armid.study.analyses.success import (
+from armid.study.analyses.convergence import (
+    convergence_figure,
     ecdf_figure,
     expected_running_time,
+    median,
     running_time,
     share_hit,
     waterfall_figure,

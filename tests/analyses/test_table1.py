@@ -6,8 +6,7 @@ import pytest
 from made_results import PAPER_CASES
 
 from armid.study.analyses.analysis import Evidence, published_values
-from armid.study.analyses.table1 import median_interval, table1_rows
-from armid.study.analyses.table2 import spread, table2
+from armid.study.analyses.paper_tables import median_interval, spread, table1_rows, table2
 
 PAPERS_MEANS = [0.487, 0.421, 0.171, 0.899]
 

@@ -11,7 +11,6 @@ from typing import Any
 import click
 
 from armid.cli.options import STUDIES, Heard, tell, while_read
-from armid.cli.start import end_on_request
 from armid.errors import INTERRUPTED, ArmidError, on_a_line
 from armid.progress import LOG
 
@@ -96,7 +95,6 @@ def main(arguments: list[str] | None = None) -> None:
             # a path that is not UTF-8 is shown, not a reason to fail
             stream.reconfigure(errors="backslashreplace")
     try:
-        end_on_request()
         code = carried_out(arguments)
     except ArmidError as error:
         stop(str(error), BAD_INPUT)

@@ -163,16 +163,13 @@ def check_new_name(kind: str, name: str, taken: Collection[str], template: str) 
     check_name(name, kind)
     if name in taken or (kind == "effect" and name in RESERVED_WORDS):
         raise ArmidError(f"{kind} '{name}' is there already: another name is expected")
-    if name in names_in(python_file(template, "_")):
+    tokens = generate_tokens(StringIO(python_file(template, "_")).readline)
+    if any(token.type == NAME and token.string == name for token in tokens):
         raise ArmidError(f"{kind} '{name}' cannot have this name, which the file itself uses: another is expected")
     module = find_spec(name)
     installed = module is not None and str(module.origin).startswith(tuple(sysconfig.get_paths().values()))
     if installed or name == "armid" or name in sys.stdlib_module_names:
         raise ArmidError(f"{kind} '{name}' cannot have this name: {name}.py would hide the module '{name}'")
-
-
-def names_in(text: str) -> set[str]:
-    return {token.string for token in generate_tokens(StringIO(text).readline) if token.type == NAME}
 
 
 def campaign_text(name: str) -> str:

@@ -5,7 +5,7 @@ import logging
 import os
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -57,24 +57,17 @@ class Command(Heard):
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command; it tells on the error stream that a model is being compiled."""
         # asked here, as what is announced comes from another thread
-        with nullcontext() if wants("quiet") else announcing(lambda text: tell(f"armid: {text}")):
-            return super().invoke(ctx)
+        if not wants("quiet"):
+            handler = logging.Handler()
+            handler.emit = lambda record: tell(f"armid: {record.getMessage()}")  # type: ignore[method-assign]
+            LOG.addHandler(handler)
+            ctx.call_on_close(partial(LOG.removeHandler, handler))
+        return super().invoke(ctx)
 
     def __init__(self, *given: Any, **named: Any) -> None:
         super().__init__(*given, **named)
         self.params += [click.Option(names, is_flag=True, expose_value=False, callback=kept, help=text)
                         for names, text in OUTPUT]  # fmt: skip
-
-
-@contextmanager
-def announcing(told: Callable[[str], None]) -> Iterator[None]:
-    handler = logging.Handler()
-    handler.emit = lambda record: told(record.getMessage())  # type: ignore[method-assign]
-    LOG.addHandler(handler)
-    try:
-        yield
-    finally:
-        LOG.removeHandler(handler)
 
 
 class Group(Heard, click.Group):

@@ -9,12 +9,11 @@ import click
 
 from armid.cli.options import Group, command, examples, give, of_studies, out_option, plugin_option, present, say
 from armid.errors import ArmidError
-from armid.registry import load_registry, place_in_plugin
+from armid.registry import load_registry
 from armid.report.result import (
     IDENTIFIABILITY,
     IDENTIFICATION,
     LOOP,
-    UNSHOWABLE,
     Kind,
     NewFiles,
     Result,
@@ -94,21 +93,14 @@ def report_study(folder: Path, key: Path | None, width: str, plugins: tuple[str,
     results = load_study(folder)
     analyses, place = load_registry(plugins).analyses, results.path.parent
     refuse_unwritable(place, PAGE_FILE)
-    try:
-        document = report_of(results, key, analyses, made_by()["command"])
-        if document.warning:
-            say(document.warning)
-        with NewFiles(place) as files:
-            if width:
-                write_prints(document, width, files.path)
-            else:
-                write_report(document, files)
-    except UNSHOWABLE as error:
-        # what a plug-in does wrong stays its own
-        if isinstance(error, ArmidError) or place_in_plugin(error) is not None:
-            raise
-        expected = "its runs cannot be shown, what armid wrote is expected"
-        raise ArmidError(f"{results.path} is damaged: {expected}") from error
+    document = report_of(results, key, analyses, made_by()["command"])
+    if document.warning:
+        say(document.warning)
+    with NewFiles(place) as files:
+        if width:
+            write_prints(document, width, files.path)
+        else:
+            write_report(document, files)
     if width:
         say(f"wrote {len(files.names)} figures as PDF to {place}")
     else:

@@ -1,6 +1,6 @@
 """The contracts of plants and of effects."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -157,18 +157,19 @@ def check_on(effect: Effect, alone: Model, model: Model) -> Iterator[ContractPoi
     except ArmidError as error:
         yield ContractPoint(f"compiles {where}", False, str(error))
         return
-    points: tuple[Callable[[], ContractPoint], ...] = (
-        lambda: printed(effect, alone), lambda: null_law(alone, model, manoeuvres),
-        lambda: acts(effect, model, manoeuvres), lambda: responds(effect, model, manoeuvres),
-        lambda: finite(model, manoeuvres, np.concatenate([within(model, alone, over_box(alone, N_CANDIDATES)),
-                                                          corners(model, effect)])),
-        lambda: deterministic(model, manoeuvres[0], within(model, alone, over_box(alone, 9))),
-        lambda: on_arrays(effect, alone),
-        lambda: agrees(model, alone, away(alone, effect, AWAY), manoeuvres[0]),
-    )  # fmt: skip
-    for point in points:
-        checked = point()
-        yield replace(checked, name=f"{checked.name} {where}")
+    yield from (replace(p, name=f"{p.name} {where}") for p in effect_points(effect, alone, model, manoeuvres))
+
+
+def effect_points(effect: Effect, alone: Model, model: Model, manoeuvres: list[Manoeuvre]) -> Iterator[ContractPoint]:
+    yield printed(effect, alone)
+    yield null_law(alone, model, manoeuvres)
+    yield acts(effect, model, manoeuvres)
+    yield responds(effect, model, manoeuvres)
+    spread = within(model, alone, over_box(alone, N_CANDIDATES))
+    yield finite(model, manoeuvres, np.concatenate([spread, corners(model, effect)]))
+    yield deterministic(model, manoeuvres[0], within(model, alone, over_box(alone, 9)))
+    yield on_arrays(effect, alone)
+    yield agrees(model, alone, away(alone, effect, AWAY), manoeuvres[0])
 
 
 def within(model: Model, part: Model, candidates: Array) -> Array:

@@ -7,15 +7,7 @@ import nlopt
 import numpy as np
 
 from armid.identifiers.identifier import RANGE, declared, option, share
-from armid.identifiers.search import (
-    LARGEST_SEED,
-    Calls,
-    Height,
-    NoFitnessError,
-    SearchOptions,
-    SearchTask,
-    local_search,
-)
+from armid.identifiers.search import Calls, Height, NoFitnessError, SearchOptions, SearchTask, local_search, seed_from
 from armid.model import Array
 
 FORWARD, CENTRAL = "forward", "central"
@@ -133,7 +125,7 @@ class ByValues(SearchOptions):
 
     def search(self, task: SearchTask) -> None:
         """Descend from the task's start, or from random ones until one has a fitness."""
-        seed = int(task.random.integers(1, LARGEST_SEED))
+        seed = seed_from(task.random)
         local_search(task, lambda start: self.descend(task, seed, start))
 
     def descend(self, task: SearchTask, seed: int, start: Array) -> None:
@@ -160,7 +152,8 @@ class ByValues(SearchOptions):
         calls = Calls(value)
         search.set_min_objective(calls)
         try:
-            optimised(search, start, calls)
+            with calls, suppress(*NO_PROGRESS):
+                search.optimize(start)
         finally:
             # the frames of the error hold NLopt's object and that holds the calls: a reference cycle through NLopt,
             # which the garbage collector cannot find
@@ -194,17 +187,3 @@ NLOPT = tuple(
              uses_gradient=algorithm.startswith("LD_"))
     for name, (note, algorithm) in ALGORITHMS.items()
 )  # fmt: skip
-
-
-def optimised(search: nlopt.opt, start: Array, calls: Calls) -> None:
-    """Let NLopt run, and raise what a call raised, however NLopt took it."""
-    try:
-        with suppress(*NO_PROGRESS):
-            search.optimize(start)
-    except SystemError:
-        # BOBYQA, stopped in a step that it tries once more, returns a result all the same; Python, which finds a
-        # result and an error, raises this in place of the error
-        if calls.error is None:
-            raise
-    if calls.error is not None:
-        raise calls.error

@@ -18,7 +18,7 @@ from pymoo.core.algorithm import Algorithm
 
 from armid.errors import ArmidError
 from armid.identifiers.identifier import Identifier, accepts, declared, option, refuse_unknown
-from armid.identifiers.search import LARGEST_SEED, Asker, Calls, SearchAlgorithm, SearchOptions, SearchTask
+from armid.identifiers.search import Asker, Calls, SearchAlgorithm, SearchOptions, SearchTask, seed_from
 from armid.model import Array
 from armid.problem.meter import PENALTY
 
@@ -61,11 +61,11 @@ def as_identifier(name: str, obj: Any) -> Identifier:
         "searches by itself, whose first argument is `value`"
     )
     if isinstance(obj, Algorithm) and obj.problem is None:
-        return Identifier(name, partial(copied, obj), "an algorithm of the user")
+        return Identifier(name, lambda budget: deepcopy(obj), "an algorithm of the user")
     if isinstance(obj, Algorithm):
         raise ArmidError(f"identifier '{name}' is a {type(obj).__name__} that was used already, {expected}")
     if isinstance(obj, type) and issubclass(obj, Algorithm) and accepts(obj):
-        return Identifier(name, partial(without_budget, obj), "a class of the user")
+        return Identifier(name, lambda budget: obj(), "a class of the user")
     if callable(obj) and not isinstance(obj, type) and "value" in arguments_of(obj):
         needed = [argument for argument, p in arguments_of(obj).items() if p.default is p.empty]
         refuse_unknown(needed, SEARCH_ARGUMENTS, f"what is given to a search such as '{name}'")
@@ -74,14 +74,6 @@ def as_identifier(name: str, obj: Any) -> Identifier:
     if callable(obj) and not isinstance(obj, type) and accepts(obj, 1):
         return Identifier(name, partial(built, name, obj), "a function of the user")
     raise ArmidError(f"identifier '{name}' is {obj!r}, {expected}")
-
-
-def copied(algorithm: Algorithm, budget: int) -> Algorithm:
-    return deepcopy(algorithm)
-
-
-def without_budget(algorithm: type[Algorithm], budget: int) -> Algorithm:
-    return algorithm()
 
 
 def built(name: str, factory: Callable[[int], Algorithm], budget: int) -> Algorithm:
@@ -111,14 +103,8 @@ def search_by(function: Callable[..., Any], options: Mapping[str, Any], task: Se
     start = cube.candidates(cube.first(task))[0] if task.start is None else task.start
     given = {"value": value, "low": low.copy(), "high": high.copy(), "budget": task.budget, "random": task.random,
              "start": start.copy()}  # fmt: skip
-    try:
+    with value.ask:
         function(**{key: given[key] for key in arguments_of(function) if key in given}, **options)
-    except Exception:
-        # compiled libraries turn an error of a call into one of their own
-        if value.ask.error is None:
-            raise
-    if value.ask.error is not None:
-        raise value.ask.error
 
 
 class Value:
@@ -169,7 +155,7 @@ class Lshade(Foreign):
         n_candidates = max(4, min(round(self.per_parameter * low.size), budget // 10))
         options = {"population_size": n_candidates, "memory_size": self.memory, "x_tol": 0.0}
         box = list(zip(low.tolist(), high.tolist(), strict=True))
-        LSHADE(value, box, None, budget, None, int(random.integers(1, LARGEST_SEED)), options).optimize()
+        LSHADE(value, box, None, budget, None, seed_from(random), options).optimize()
 
 
 @dataclass(frozen=True)
@@ -189,7 +175,7 @@ class Ngopt(Foreign):
 
         # nevergrad 1.0.12 makes a number of an array of one, which numpy 2.4 refuses
         vars(metamodel).setdefault("float", lambda number: float(np.asarray(number).item()))
-        seed, point = int(random.integers(1, LARGEST_SEED)), ng.p.Array(shape=low.shape, lower=0.0, upper=1.0)
+        seed, point = seed_from(random), ng.p.Array(shape=low.shape, lower=0.0, upper=1.0)
         point.random_state, before = np.random.RandomState(seed), set(threading.enumerate())
         # some of its methods draw from the global generators all the same
         with global_generators(seed), warnings.catch_warnings():
@@ -237,7 +223,7 @@ class Tpe(Foreign):
 
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", optuna.exceptions.ExperimentalWarning)
-            seed = int(random.integers(1, LARGEST_SEED))
+            seed = seed_from(random)
             sampler = optuna.samplers.TPESampler(seed=seed, multivariate=True, n_startup_trials=self.n_first)
         optuna.logging.set_verbosity(optuna.logging.WARNING)
         study = optuna.create_study(sampler=sampler)

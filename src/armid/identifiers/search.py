@@ -97,6 +97,11 @@ class Cube:
         return task.random.random(self.n) if task.start is None else self.point(task.start)
 
 
+def seed_from(random: np.random.Generator) -> int:
+    """Return a seed for a generator of another library, which takes 31 bits."""
+    return int(random.integers(1, 2**31 - 1))
+
+
 def local_search(task: SearchTask, routine: Callable[[Array], None]) -> None:
     """Run a routine from the task's start, or from points drawn in the box until one of them has a fitness."""
     start = task.cube.first(task)
@@ -122,6 +127,16 @@ class Calls:
         except BaseException as error:
             self.error = error
             raise
+
+    def __enter__(self) -> None:
+        """Let a library call."""
+
+    def __exit__(self, kind: object, error: BaseException | None, _: object) -> None:
+        """Raise what a call raised, however the library took it."""
+        # compiled libraries turn an error of a call into one of their own; where one returns a result all the same, as
+        # BOBYQA stopped in a step that it tries once more, Python raises a SystemError in place of the error
+        if self.error is not None and (error is None or isinstance(error, Exception)):
+            raise self.error
 
 
 class Height:
@@ -158,7 +173,6 @@ def bounds_of(problem: Problem) -> tuple[Array, Array]:
     return problem.xl, problem.xu
 
 
-LARGEST_SEED = 2**31 - 1
 PLAIN = ["F", "G", "H"]
 
 
@@ -292,14 +306,14 @@ def carry_out(algorithm: Algorithm, task: SearchTask, seed: int | None = None) -
     """Search as a fresh algorithm does, from the task's start if it has one; seed: of the run, None in a part of it."""
     if isinstance(algorithm, SearchAlgorithm):
         is_own = algorithm.is_seeded and seed is None
-        random = np.random.default_rng(int(task.random.integers(1, LARGEST_SEED))) if is_own else task.random
+        random = np.random.default_rng(seed_from(task.random)) if is_own else task.random
         algorithm.search(replace(task, random=random, budget=algorithm.budget))
         return
     if isinstance(algorithm, LocalSearch) and task.start is not None:
         algorithm.initialization = Initialization(task.start[np.newaxis])
     elif task.start is not None:
         algorithm.x0 = task.start.copy()
-    seed = int(task.random.integers(1, LARGEST_SEED)) if seed is None else seed
+    seed = seed_from(task.random) if seed is None else seed
     algorithm.setup(task.problem, termination=NoTermination(), seed=seed)
     while algorithm.has_next():
         asked = algorithm.ask()

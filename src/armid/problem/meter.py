@@ -11,7 +11,6 @@ from pymoo.core.termination import Termination
 from armid.errors import ArmidError, quoted
 from armid.model import Array
 
-FIRST_CHUNK = 1024
 # Candidates that may be asked for after the budget at least: an algorithm ends with its generation.
 LEAST_GRACE = 100
 # What is asked for has to end within a lifetime.
@@ -28,7 +27,7 @@ class BudgetIgnoredError(ArmidError):
 
 
 class Log(NamedTuple):
-    """Everything that was simulated, in order; read-only views.
+    """Everything that was simulated, in order; read-only.
 
     X: candidates, (used, n_parameters); F: their fitness, (used,); failed: whether the simulation failed, (used,).
     """
@@ -71,9 +70,9 @@ class Meter:
         self.best_f = float("inf")
         self._largest, self._refused = LEAST_GRACE, 0
         self._improvements: list[tuple[int, float]] = []
-        self._X = np.empty((0, 0))
-        self._F = np.empty(0)
-        self._failed = np.empty(0, np.bool_)
+        self._n_parameters = 0
+        # the log as bytes, which grow in place
+        self._X, self._F, self._failed = bytearray(), bytearray(), bytearray()
 
     @property
     def left(self) -> int:
@@ -116,34 +115,26 @@ class Meter:
             return
         if x.ndim != 2 or x.shape[0] != f.size or lost.shape != f.shape:
             raise ArmidError(f"candidates {x.shape}, fitness {f.shape} and failures {lost.shape} do not match")
-        if self.used and x.shape[1] != self._X.shape[1]:
-            raise ArmidError(f"candidates have {x.shape[1]} parameters, expected {self._X.shape[1]} as before")
+        if self.used and x.shape[1] != self._n_parameters:
+            raise ArmidError(f"candidates have {x.shape[1]} parameters, expected {self._n_parameters} as before")
         if f.size > self.left:
             raise ArmidError(f"{f.size} simulations were made, the budget allowed {self.left}")
-        self._append(x, f, lost)
+        self._n_parameters = x.shape[1]
+        for log, values in ((self._X, x), (self._F, f), (self._failed, lost)):
+            log.extend(values.tobytes())
         self._improve(x, np.where(lost | np.isnan(f), np.inf, f))
         self.used += f.size
         self.n_failed += int(np.count_nonzero(lost))
 
     def log(self) -> Log:
         """Return everything recorded."""
-        views = self._X[: self.used], self._F[: self.used], self._failed[: self.used]
-        for view in views:
-            view.flags.writeable = False
-        return Log(*views)
+        X, F = np.frombuffer(bytes(self._X)), np.frombuffer(bytes(self._F))
+        return Log(X.reshape(self.used, self._n_parameters), F, np.frombuffer(bytes(self._failed), np.bool_))
 
     def trace(self) -> Trace:
         """Return the improvements."""
         evaluations, values = zip(*self._improvements, strict=True) if self._improvements else ((), ())
         return Trace(np.array(evaluations, np.int64), np.array(values, np.float64))
-
-    def _append(self, x: Array, f: Array, failed: NDArray[np.bool_]) -> None:
-        end = self.used + f.size
-        if end > self._F.size:
-            room = min(self.budget, max(FIRST_CHUNK, 2 * end))
-            self._X = padded(self._X[: self.used].reshape(self.used, x.shape[1]), room)
-            self._F, self._failed = padded(self._F[: self.used], room), padded(self._failed[: self.used], room)
-        self._X[self.used : end], self._F[self.used : end], self._failed[self.used : end] = x, f, failed
 
     def _improve(self, x: Array, f: Array) -> None:
         if not f.min() < self.best_f:
@@ -223,12 +214,8 @@ class Metered(Problem):  # type: ignore[misc]
             values = np.where(failed, PENALTY, values)
         if self.meter is not None:
             self.meter.record(asked, values, failed)
-        if granted == len(X):
-            return values, vectors
-        return padded(values, len(X), PENALTY), None if vectors is None else padded(vectors, len(X), np.nan)
-
-
-def padded(values: NDArray[Any], n: int, filler: float = 0.0) -> NDArray[Any]:
-    longer = np.full((n, *values.shape[1:]), filler, values.dtype)
-    longer[: len(values)] = values
-    return longer
+        beyond = len(X) - granted
+        if beyond:
+            values = np.pad(values, (0, beyond), constant_values=PENALTY)
+            vectors = None if vectors is None else np.pad(vectors, ((0, beyond), (0, 0)), constant_values=np.nan)
+        return values, vectors

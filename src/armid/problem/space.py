@@ -42,8 +42,7 @@ class Space:
         array([[0.1, 0.5],
                [0.2, 0.5]])
         """
-        whole = np.empty((len(X), len(self.fixed)))
-        whole[:] = self.fixed
+        whole = np.tile(self.fixed, (len(X), 1))
         whole[:, self.free] = X
         return whole
 

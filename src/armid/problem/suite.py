@@ -5,11 +5,11 @@ problems that are made of somebody's campaigns hold measured ones.
 """
 
 import hashlib
-import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from pathlib import Path
+from timeit import repeat
 from typing import Any, overload
 
 import numpy as np
@@ -335,12 +335,7 @@ class SuiteProblem(Problem):  # type: ignore[misc]
     def cost_s(self) -> float:
         """Time of one evaluation on this machine, one thread, measured in populations of 64 [s]."""
         X = self.spread(64)
-        spans = []
-        for _ in range(3):
-            began = time.perf_counter()
-            self.identification.value(X)
-            spans.append(time.perf_counter() - began)
-        return min(spans) / len(X)
+        return min(repeat(lambda: self.identification.value(X), number=1, repeat=3)) / len(X)
 
     def spread(self, n: int) -> Array:
         """Return candidates drawn uniformly from the box, SI, the same at each call, (n, n_var)."""

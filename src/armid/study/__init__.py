@@ -7,7 +7,7 @@ Where a run goes, in reading order:
 - inputs: what drives the machine in a manoeuvre
 - tasks: builds the list of runs of a study of either kind, and executes a single run
 - runner: run what is missing of a study
-- pool, worker: processes on this machine that perform runs, or a cluster; the program of such a process
+- pool: processes on this machine that perform runs, or a cluster; the program of such a process
 - store: runs as they are handed on; one SQLite file that holds the planned and the finished ones
 
 The other files: loops (the kind of study that closes the loop), tune (options of identifiers, learnt on other

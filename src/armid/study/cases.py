@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from armid.engine import FINE, Schedule, calibrate, simulate
-from armid.errors import ArmidError, quoted
+from armid.errors import ArmidError, located, quoted
 from armid.estimation.least_squares import with_fitted_starts
 from armid.model import Manoeuvre, Model, Plant
 from armid.problem.problem import Replay, replays
@@ -24,17 +24,7 @@ from armid.record.record import made_record
 from armid.record.resample import FEWEST_SAMPLES, is_constant, with_window
 from armid.record.schema import RecordSheet, unknown_name, validated
 from armid.study.inputs import input_values, inputs_of
-from armid.study.spec import (
-    NOISES,
-    WHOLE_WINDOW,
-    CaseSpec,
-    ManoeuvreSpec,
-    RandomCasesSpec,
-    StudyRegistry,
-    StudySpec,
-    SuiteSpec,
-    lookup,
-)
+from armid.study.spec import NOISES, CaseSpec, ManoeuvreSpec, RandomCasesSpec, StudyRegistry, StudySpec, SuiteSpec
 from armid.units import DEG, SUFFIXES
 
 MOST_SIMULATED = 10**7
@@ -145,10 +135,8 @@ def _space(
     own_bounds, own_fixed = (entry.bounds, entry.fixed) if entry else ({}, {})
     fixed = {name: v for name, v in spec.fixed.items() if name not in own_bounds} | dict(own_fixed)
     bounds = {name: b for name, b in spec.bounds.items() if name not in own_fixed} | dict(own_bounds)
-    try:
+    with located(where):
         return space_of(model, overrides, bounds, fixed)
-    except ArmidError as error:
-        raise ArmidError(f"{where}: {error}") from error
 
 
 def _campaign_case(
@@ -179,10 +167,8 @@ def campaign_folder(folder: Path, campaign: str, where: str) -> Path:
     ):
         raise ArmidError(f"{where}: campaign {quoted(campaign)} leads out of the folder of the study, a folder inside "
                          "is expected")  # fmt: skip
-    try:
+    with located(where):
         toml = campaign_path(path)
-    except ArmidError as error:
-        raise ArmidError(f"{where}: {error}") from error
     if toml.name != CAMPAIGN_FILE:
         raise ArmidError(
             f"{where}: campaign {quoted(campaign)} is a file: a folder that holds {CAMPAIGN_FILE} is expected"
@@ -287,8 +273,7 @@ def _random_cases(spec: StudySpec, model: Model, folder: Path, where: str) -> li
     whole = space.complete(low + (high - low) * (wanted.margin + (1.0 - 2.0 * wanted.margin) * points))
     truths = [dict(zip(space.names, row.tolist(), strict=True)) for row in whole]
     first = _simulated_case(Case("", model, space, truths[0]), wanted.manoeuvres, spec, folder, where)
-    names = [f"random {i:0{len(str(n))}d}" for i in range(1, n + 1)]
-    return [replace(first, name=name, truth=_completed(t, model, where)) for name, t in zip(names, truths, strict=True)]
+    return [replace(first, name=f"random {i:0{len(str(n))}d}", truth=truth) for i, truth in enumerate(truths, 1)]
 
 
 def clean_records(settings: Mapping[str, Any], model: Model) -> tuple[Record, ...]:
@@ -313,7 +298,7 @@ def clean_records(settings: Mapping[str, Any], model: Model) -> tuple[Record, ..
 
 def in_window(record: Record, window: Sequence[float] | str) -> Record:
     """Return the record in a window [s]; the word for the whole record keeps the window of its file."""
-    if window == WHOLE_WINDOW:
+    if isinstance(window, str):
         return record
     return with_window(record, (float(window[0]), float(window[1])), f"{record.file}, windows_s")
 
@@ -397,15 +382,11 @@ class RunCache:
         return PreparedCase(str(model), space, () if "campaign" in settings else tuple(whole), made)
 
     def _source(self, settings: Mapping[str, Any]) -> tuple[Model, tuple[Record, ...]]:
-        source = settings.get("campaign")
-        if source is None:
-            plant = lookup(self.registry.plants, settings["plant"], "plant", "settings")
-        else:
+        if source := settings.get("campaign"):
             campaign = self._once("campaign", source, lambda: self._campaign(**source))
-            plant = campaign.plant
-        model = self.registry.with_effects(Model(plant), settings["effects"], "settings")
-        if source is not None:
+            model = self.registry.with_effects(Model(campaign.plant), settings["effects"], "settings")
             return model, tuple(r for r in campaign.records if r.file in source["records"])
+        model = self.registry.model(settings["plant"], settings["effects"], "settings")
         parts = {word: settings[word] for word in ("plant", "effects", "truth", "strokes", "interval_s")}
         return model, self._once("clean", parts, lambda: clean_records(settings, model))
 

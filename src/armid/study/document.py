@@ -15,16 +15,12 @@ from armid.report.html import html
 from armid.report.result import NewFiles
 from armid.report.style import pyplot
 from armid.study.analyses.analysis import Evidence, wide_runs
-from armid.study.analyses.answer import answer_of
-from armid.study.analyses.convergence import ANYTIME, CONVERGENCE
+from armid.study.analyses.convergence import ANYTIME, BEST_FITNESS, CONVERGENCE, RUNNING_TIME, SUCCESS
 from armid.study.analyses.cramer_rao import CRAMER_RAO
-from armid.study.analyses.errors import ERRORS
-from armid.study.analyses.fitness_quality import FITNESS_QUALITY
-from armid.study.analyses.overview import OVERVIEW, RUNS_ANALYSIS, campaigns, counted, loop_runs, main_table, verdicts
+from armid.study.analyses.errors import ERRORS, FITNESS_QUALITY
+from armid.study.analyses.overview import OVERVIEW, RUNS_ANALYSIS, answer_of, loop_runs, loop_tables, main_table
+from armid.study.analyses.paper_tables import TABLE1, TABLE2
 from armid.study.analyses.ranks import BY_CLASS, RANKS, class_ranks
-from armid.study.analyses.success import BEST_FITNESS, RUNNING_TIME, SUCCESS
-from armid.study.analyses.table1 import TABLE1
-from armid.study.analyses.table2 import TABLE2
 from armid.study.results import StudyResults
 from armid.study.spec import CLOSES_LOOP, IDENTIFIES, KIND_NAMES
 from armid.units import DEG, angles_in
@@ -138,13 +134,15 @@ def report_of(
     answer: tuple[str, ...]
     if closes_loops:
         runs = loop_runs(results.loops)
-        sections = [Section("Verdicts", (verdicts(runs),)), Section("Campaigns", (campaigns(runs),))]
-        facts, answer = loop_facts(study, scored=key is not None or bool(study["key"])), (counted(runs),)
+        sentence, verdicts, campaigns = loop_tables(runs)
+        sections = [Section("Verdicts", (verdicts,)), Section("Campaigns", (campaigns,))]
+        facts, answer = loop_facts(study, scored=key is not None or bool(study["key"])), (sentence,)
     else:
         with angles_in(angle):
             evidence = Evidence(results)
             analyses = OF_SUITES if evidence.is_suite else ANALYSES
-            sections = [Section(a.title, tuple(map(evidence.apart, a.parts(evidence)))) for a in analyses]
+            sections = [Section(a.title, tuple(map(evidence.apart, a.parts(evidence)))) for a in analyses
+                        if a.applies(evidence)]  # fmt: skip
             facts, runs, answer = facts_of(evidence), wide_runs(evidence), answer_of(evidence, sections[0].parts[0])
     shown = (*(s for s in sections if s.parts), *own_sections(own, runs), made_section(results, again))
     state = state_of(study)
@@ -163,8 +161,8 @@ def summary_of(results: StudyResults) -> Document:
             main = class_ranks(evidence) if evidence.is_suite else main_table(evidence)
             main, answer = evidence.apart(main), answer_of(evidence, main)
     else:
-        runs = loop_runs(results.loops)
-        main, answer = verdicts(runs), (counted(runs),)
+        sentence, main, _ = loop_tables(loop_runs(results.loops))
+        answer = (sentence,)
     return Document(results.study["name"], "Study", str(results.study.get("question", "")),
                     (*answer, state_of(results.study)), (), main=(main,))  # fmt: skip
 

@@ -1,7 +1,8 @@
 """Who performs the runs of a study: worker processes on this machine, each run with a time limit, or a Dask cluster.
 
 A run that takes too long is stopped, and a worker that dies is replaced; both lose no other run. A worker is a program
-of its own and no child of multiprocessing: a script needs no main guard, and workers of Dask may have workers.
+of its own, `python -m armid.study.pool FILE_DESCRIPTOR PARENT`, and no child of multiprocessing: a script needs no main
+guard, and workers of Dask may have workers.
 """
 
 import logging
@@ -23,9 +24,11 @@ from queue import SimpleQueue
 from threading import Lock
 from typing import Any
 
-from armid.errors import ArmidError
+from armid.errors import INTERRUPTED, ArmidError
+from armid.study.cases import RunCache
+from armid.study.spec import study_registry
 from armid.study.store import FAILED, MissingRun, Outcome
-from armid.study.worker import FINISHED, READY, REFUSED
+from armid.study.tasks import perform, task_type
 
 # How often a run may take its worker with it: the first time it may have been someone else's kill.
 MOST_DEATHS = 2
@@ -34,7 +37,7 @@ MOST_STARTS = 3
 # A process that does not even start within this time [s] never will.
 START_S = 300.0
 THREADS = ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
-LATE, DIED = "late", "died"
+READY, REFUSED, FINISHED, LATE, DIED = "ready", "refused", "finished", "late", "died"
 NO_MESSAGE = "sent what is not a message of ours: something in the run writes into its pipe"
 
 
@@ -89,7 +92,7 @@ class Worker:
     def _start(self) -> None:
         for _ in range(MOST_STARTS):
             ours, theirs = Pipe()
-            command = [sys.executable, "-P", "-m", "armid.study.worker", str(theirs.fileno()), str(os.getpid())]
+            command = [sys.executable, "-P", "-m", "armid.study.pool", str(theirs.fileno()), str(os.getpid())]
             nothing = subprocess.DEVNULL
             with self._lock, theirs, sigint_blocked():
                 if self._is_stopped:
@@ -244,3 +247,42 @@ def _connected(address: str) -> Any:
         raise ArmidError(f"the Dask cluster at {address} does not answer, tcp://HOST:PORT of a scheduler with a worker "
                          "is expected") from error  # fmt: skip
     return client
+
+
+# How often a worker looks whether the process that it works for still lives [s].
+LOOKS_EVERY_S = 1.0
+
+
+def main(descriptor: int, parent: int) -> None:
+    """Be a worker: receive kind, plug-ins and folder, then perform runs one by one until the other end is closed."""
+    # Ctrl-C and its like are for the process that decides: a run is made whole, or not at all
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+    connection = Connection(descriptor)
+    try:
+        kind, plugins, folder = connection.recv()
+        # what runs need is imported before the first: where that fails no worker starts, and no run is to blame
+        task_type(kind)
+        cache = RunCache(study_registry(plugins), Path(folder))
+        connection.send((READY, None))
+        while True:
+            connection.send((FINISHED, perform(connection.recv(), cache)))
+    except ArmidError as error:
+        # plug-ins that cannot be read, or the machine is at fault: what else a run raises is its outcome
+        connection.send((REFUSED, str(error)))
+    except KeyboardInterrupt:
+        os._exit(INTERRUPTED)
+    except (EOFError, OSError):
+        # the process that we work for has closed its end, or has ended
+        os._exit(0)
+
+
+def _end_with(parent: int) -> None:
+    """End this process soon after the one that it works for has ended, also in the middle of a run."""
+    while os.getppid() == parent:
+        time.sleep(LOOKS_EVERY_S)
+    os._exit(1)
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), int(sys.argv[2]))

@@ -1,15 +1,11 @@
 """Stored results of a study as tidy tables."""
 
 import json
-import shutil
 import sqlite3
-import zlib
 from collections.abc import Iterator
-from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,16 +13,7 @@ import pandas as pd
 
 from armid.errors import ArmidError, StudyError, caused_by, nearest
 from armid.report.result import NewFiles, Shown
-from armid.study.store import (
-    DONE,
-    FILE_NAME,
-    WAIT_S,
-    RunTrace,
-    check_format,
-    connected,
-    translate_errors,
-    unpacked,
-)
+from armid.study.store import EVERY_RUN, FILE_NAME, TALLY, RunTrace, reading, unpacked
 
 if TYPE_CHECKING:
     from armid.report.document import Document
@@ -116,7 +103,7 @@ class StudyResults(Shown):
     @property
     def loops(self) -> pd.DataFrame:
         """One row a campaign that was closed: run, case, verdict, seconds, cpu_seconds, report (a dict)."""
-        with _reading(self.path) as connection:
+        with reading(self.path) as connection:
             loops = frame_of(connection, LOOPS)
             return loops.assign(report=[json.loads(text) for text in loops["report"]])
 
@@ -132,14 +119,14 @@ class StudyResults(Shown):
         return self._one("SELECT text FROM texts WHERE hash = ?", digest, f"text of hash '{digest}'")
 
     def _one(self, query: str, value: str, what: str) -> str:
-        with _reading(self.path) as connection:
+        with reading(self.path) as connection:
             row = connection.execute(query, (value,)).fetchone()
         if row is None:
             raise ArmidError(f"{self.path} holds no {what}")
         return str(row[0])
 
     def _traces(self, query: str, values: tuple[str, ...]) -> Iterator[RunTrace]:
-        with _reading(self.path) as connection:
+        with reading(self.path) as connection:
             for run, names, content in connection.execute(query, values):
                 yield unpacked(run, content, tuple(json.loads(names)))
 
@@ -176,18 +163,15 @@ def load_study(path: str | Path) -> StudyResults:
     file = Path(path) / FILE_NAME if Path(path).is_dir() else Path(path)
     if not file.is_file():
         raise ArmidError(f"there is no store {file}: a folder that `armid study` has written is expected")
-    with _reading(file) as connection:
+    with reading(file) as connection:
         # one transaction: a runner that is at work changes nothing between the tables
         connection.execute("BEGIN")
         row = connection.execute("SELECT value FROM study WHERE key = 'description'").fetchone()
         if row is None:
             raise ArmidError(f"{file} holds no study yet: let `armid study` begin it")
         study = json.loads(row[0])
-        status = "SELECT status, count(*) FROM plan JOIN runs USING (run) GROUP BY status"
-        ended = dict(connection.execute(status).fetchall())
-        study["n_planned"] = connection.execute("SELECT count(*) FROM plan").fetchone()[0]
-        study["n_done"] = ended.get(DONE, 0)
-        study["n_failed"] = sum(ended.values()) - study["n_done"]
+        planned, ended, failed = connection.execute(TALLY, EVERY_RUN).fetchone()
+        study |= {"n_planned": planned, "n_done": ended - failed, "n_failed": failed}
         study |= {"versions": _versions(connection), "folder": str(file.parent)}
         study["parameters"] = list(dict.fromkeys(str(name) for case in study["cases"] for name in case["bounds"]))
         parameters = _parameters(connection, study)
@@ -232,37 +216,6 @@ def _parameters(connection: sqlite3.Connection, study: dict[str, Any]) -> pd.Dat
 
 def _versions(connection: sqlite3.Connection) -> dict[str, str]:
     query = "SELECT DISTINCT t.text FROM plan JOIN runs r USING (run) JOIN texts t ON t.hash = r.versions"
-    versions: dict[str, list[str]] = {}
-    for (text,) in connection.execute(query):
-        for package, version in json.loads(text).items():
-            versions.setdefault(package, []).append(version)
-    return {package: ", ".join(sorted(set(those))) for package, those in versions.items()}
-
-
-@contextmanager
-def _reading(path: Path) -> Iterator[sqlite3.Connection]:
-    """Give a connection that cannot write, and tell in one sentence what cannot be read.
-
-    A store whose runner was killed has a log in its folder. In a read-only folder both are copied to be read.
-    """
-    with translate_errors(path), ExitStack() as stack:
-        uri = f"{path.resolve().as_uri()}?mode=ro"
-        connection = stack.enter_context(closing(connected(uri, uri=True, timeout=WAIT_S)))
-        try:
-            check_format(connection, path)
-        except sqlite3.OperationalError as error:
-            if not error.sqlite_errorname.startswith(("SQLITE_CANTOPEN", "SQLITE_READONLY")):
-                raise
-            beside = stack.enter_context(TemporaryDirectory(prefix="armid-"))
-            for file in path.parent.glob(f"{path.name}*"):
-                shutil.copy(file, beside)
-            connection = stack.enter_context(closing(connected(Path(beside) / path.name)))
-            check_format(connection, path)
-        try:
-            yield connection
-        except (ValueError, TypeError, KeyError, AttributeError, zlib.error) as error:
-            if isinstance(error, ArmidError):
-                raise
-            raise ArmidError(
-                f"{path} is damaged: what it holds cannot be read, what armid wrote is expected"
-            ) from error
+    of_runs: list[dict[str, str]] = [json.loads(text) for (text,) in connection.execute(query)]
+    packages = dict.fromkeys(package for versions in of_runs for package in versions)
+    return {package: ", ".join(sorted({v[package] for v in of_runs if package in v})) for package in packages}

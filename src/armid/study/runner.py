@@ -4,7 +4,7 @@ import json
 import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import partial
@@ -12,7 +12,7 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from armid.errors import ArmidError, MachineError, StudyError, caused_by, nearest
+from armid.errors import ArmidError, StudyError, caused_by, located, nearest
 from armid.estimation.identify import ctrl_c_waits
 from armid.progress import announced, console
 from armid.report.result import refuse_unwritable
@@ -133,12 +133,8 @@ def run(
     if not 0.0 < time_limit < 1e9:
         raise ArmidError(f"the time limit is {time_limit:g}, a number of seconds above 0 is expected")
     setup = WorkerSetup(study.kind, study.registry.plugins, study.folder, time_limit)
-    try:
+    with located(file):
         study.check(partial(performed_apart, setup))
-    except MachineError:
-        raise
-    except ArmidError as error:
-        raise ArmidError(f"{file}: {error}") from error
     folder, named = OUT / study.name if out is None else Path(out), Path(file)
     # a whole path says something on this machine alone
     told = named.name if named.is_absolute() else named.as_posix()
@@ -162,12 +158,10 @@ def run(
             if counts.missing:
                 width = min(jobs or cpu_count(), counts.missing)
                 pool = LocalPool(width, setup) if dask is None else DaskPool(dask, setup)
-                try:
+                with closing(pool):
                     for outcome in _performed(store, pool, interrupted):
                         finished, simulations = finished + 1, simulations + outcome.used
                         progress(counts, outcome)
-                finally:
-                    pool.close()
             return Ending(
                 study, folder, store.counts(), finished, simulations, time.monotonic() - began, interrupted(),
                 store.first_error(),

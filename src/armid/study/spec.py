@@ -9,17 +9,17 @@ from pathlib import Path
 from typing import Any
 
 from armid.engine.calibrate import ALLOWED
-from armid.errors import ArmidError, MachineError
+from armid.errors import MachineError, located
 from armid.model import Model
 from armid.record.schema import (
     CONSTANTS_KEY,
     EFFECTS_KEY,
     PLANT,
     Kind,
-    KindError,
     above_zero,
     any_table,
     any_text,
+    instance_of,
     key,
     kind,
     list_of,
@@ -52,14 +52,11 @@ MOST_SEEDS, MOST_CASES = 10**6, 10**5
 # Kinds of values, see `armid.record.schema`: each returns a value as it is wanted, or raises KindError.
 
 
-def whole_number(least: int = 0, most: int = LARGEST_COUNT) -> Kind:
-    @kind(type="integer", minimum=least, maximum=most)
-    def read(value: object) -> int:
-        if isinstance(value, int) and not isinstance(value, bool) and least <= value <= most:
-            return value
-        raise KindError(value)
+integer = tested(instance_of(int, "integer"), lambda value: not isinstance(value, bool))
 
-    return read
+
+def whole_number(least: int = 0, most: int = LARGEST_COUNT) -> Kind:
+    return tested(integer, lambda value: least <= value <= most, minimum=least, maximum=most)
 
 
 # A name that is safe as the name of a folder.
@@ -89,12 +86,9 @@ def one_or_more(kind: Kind) -> Kind:
 rising_counts = tested(one_or_more(count), lambda counts: list(counts) == sorted(set(counts)))
 
 
-@kind(type="number", minimum=0)
-def at_least_zero(value: object) -> float:
-    if number(value) < 0.0:
-        raise KindError(value)
-    # -0.0 is 0 and is to be written like it
-    return float(number(value)) + 0.0
+# -0.0 is 0 and is to be written like it
+plain_zero = Kind(lambda value: number(value) + 0.0, number.schema)
+at_least_zero = tested(plain_zero, lambda value: value >= 0.0, minimum=0)
 
 
 @kind(anyOf=[{"const": WHOLE_WINDOW}, list_of(number, 2, 2).schema])
@@ -386,10 +380,11 @@ class StudyRegistry(Registry):
     digests: Mapping[tuple[str, str], str] = field(default_factory=dict)
 
     def identifier(self, name: str, where: str) -> Any:
-        try:
+        with located(where):
             return self.identifier_of(name)
-        except ArmidError as error:
-            raise ArmidError(f"{where}: {error}") from error
+
+    def model(self, plant: str, effects: Iterable[str], where: str) -> Model:
+        return self.with_effects(Model(lookup(self.plants, plant, "plant", where)), effects, where)
 
     def with_effects(self, model: Model, names: Iterable[str], where: str) -> Model:
         known = self.effects_for(model.plant)

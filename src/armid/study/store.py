@@ -3,13 +3,15 @@
 import hashlib
 import json
 import os
+import shutil
 import sqlite3
 import time
 import zlib
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, closing, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -155,6 +157,7 @@ CHOSEN = f"""
 (p."case" = :case OR p."case" GLOB :case) AND (p.identifier = :identifier OR p.identifier GLOB :identifier
 OR p.identifier || '{ON}' || p.fitness GLOB :identifier)
 """
+EVERY_RUN = {"case": "*", "identifier": "*"}
 MISSING = f"""
 SELECT p.place, p.run, s.settings FROM plan p JOIN settings s USING (run)
 WHERE p.place > :after AND {CHOSEN} AND NOT EXISTS (SELECT 1 FROM runs r WHERE r.run = p.run) ORDER BY p.place LIMIT :n
@@ -338,6 +341,35 @@ def opened(path: Path) -> sqlite3.Connection:
     return connection
 
 
+@contextmanager
+def reading(path: Path) -> Iterator[sqlite3.Connection]:
+    """Give a connection that cannot write, and tell in one sentence what cannot be read.
+
+    A store whose runner was killed has a log in its folder. In a read-only folder both are copied to be read.
+    """
+    with translate_errors(path), ExitStack() as stack:
+        uri = f"{path.resolve().as_uri()}?mode=ro"
+        connection = stack.enter_context(closing(connected(uri, uri=True, timeout=WAIT_S)))
+        try:
+            check_format(connection, path)
+        except sqlite3.OperationalError as error:
+            if not error.sqlite_errorname.startswith(("SQLITE_CANTOPEN", "SQLITE_READONLY")):
+                raise
+            beside = stack.enter_context(TemporaryDirectory(prefix="armid-"))
+            for file in path.parent.glob(f"{path.name}*"):
+                shutil.copy(file, beside)
+            connection = stack.enter_context(closing(connected(Path(beside) / path.name)))
+            check_format(connection, path)
+        try:
+            yield connection
+        except (ValueError, TypeError, KeyError, AttributeError, zlib.error) as error:
+            if isinstance(error, ArmidError):
+                raise
+            raise ArmidError(
+                f"{path} is damaged: what it holds cannot be read, what armid wrote is expected"
+            ) from error
+
+
 def keep_log(connection: sqlite3.Connection) -> None:
     """Make a store keep a write-ahead log; SQLite waits for no other process that does so in the same moment."""
     until = time.monotonic() + WAIT_S
@@ -371,21 +403,13 @@ def check_format(connection: sqlite3.Connection, path: Path, may_be_new: bool = 
 @contextmanager
 def transaction(connection: sqlite3.Connection) -> Iterator[None]:
     """Do all or nothing; other writers wait from the beginning on."""
-    connection.execute("BEGIN IMMEDIATE")
-    try:
+    with connection:
+        connection.execute("BEGIN IMMEDIATE")
         yield
-        connection.execute("COMMIT")
-    except BaseException:
-        # SQLite has rolled back by itself after some errors, such as a full disk
-        with suppress(sqlite3.Error):
-            connection.execute("ROLLBACK")
-        raise
 
 
 def closed(connection: sqlite3.Connection) -> None:
     """Close a connection; the last one leaves a single file that can be read in any place, also a read-only one."""
-    with suppress(sqlite3.Error):
+    with suppress(sqlite3.Error), closing(connection):
         connection.execute("PRAGMA busy_timeout = 0")
         connection.execute("PRAGMA journal_mode = DELETE")
-    with suppress(sqlite3.Error):
-        connection.close()

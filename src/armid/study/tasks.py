@@ -23,10 +23,9 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeAlias
 
 import numpy as np
 
-from armid.errors import ArmidError, MachineError, StudyError, caused_by, quoted
+from armid.errors import ArmidError, MachineError, StudyError, caused_by, located, quoted
 from armid.estimation.identify import WAS_INTERRUPTED, Identification, identified, versions_of
 from armid.identifiers import options_of
-from armid.model import Model
 from armid.problem.fitness import fitness_of_name
 from armid.problem.problem import by_record
 from armid.problem.suite import SuiteProblem, first_of
@@ -190,8 +189,7 @@ class Study:
         spec = validated(StudySpec, table, where)
         if spec.report not in REPORTS:
             raise unknown_name("report", spec.report, REPORTS[1:], where)
-        plant = Model(lookup(registry.plants, spec.plant, "plant", where))
-        model = registry.with_effects(plant, spec.effects, where)
+        model = registry.model(spec.plant, spec.effects, where)
         entries = _entries(spec, model.plant.output_unit, registry, where)
         cases = cases_of(spec, model, registry, folder, where)
         for entry in entries:
@@ -397,14 +395,12 @@ def _check_built(entry: EntrySpec, registry: StudyRegistry, where: str) -> None:
     """
     identifier = registry.identifier(entry.name, where)
     asked = [lookup(registry.fitness, fitness.partition(":")[0], "fitness", where) for fitness in entry.fitness]
-    try:
+    with located(where):
         for fitness in asked:
             identifier.refuse(fitness)
         built = identifier.with_options(entry.options)
         if not registry.digests_of("identifiers", entry.name):
             built.build(entry.largest_budget)
-    except ArmidError as error:
-        raise ArmidError(f"{where}: {error}") from error
 
 
 def _check_noise(entry: EntrySpec, cases: Sequence[Case], registry: StudyRegistry, where: str) -> None:

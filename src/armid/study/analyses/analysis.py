@@ -130,12 +130,13 @@ PARAMETER, N_RUNS = Column("parameter", "parameter"), Column("n", "runs", ".0f")
 
 @dataclass(frozen=True)
 class Analysis:
-    """One section of the report of a study, and a line of `armid list analyses`; no parts where it does not apply."""
+    """One section of the report of a study, and a line of `armid list analyses`; nothing where it has no parts."""
 
     name: str
     title: str
     parts: Callable[["Evidence"], Sequence[Part]]
     note: str
+    applies: Callable[["Evidence"], bool] = lambda evidence: True
 
 
 class Evidence:
@@ -207,6 +208,10 @@ class Evidence:
     def knows_truth(self) -> bool:
         return bool(self.parameters["truth"].notna().any())
 
+    @property
+    def has_results(self) -> bool:
+        return not self.parameters.empty
+
     @cached_property
     def groups(self) -> dict[str, dict[str, NDArray[np.intp]]]:
         rows = self.runs.groupby(["setting", "variant"], sort=False).indices
@@ -258,6 +263,13 @@ class Evidence:
         """The paper's own swarm in every form that was run, then the best of the others."""
         own = [v for v in self.variants if is_swarm(v)]
         return own + [v for v in self.best_first if v not in own][:MOST_OTHERS]
+
+    def scale_of_fitness(self, name: str) -> tuple[str, float]:
+        """Return the unit of a fitness as it is written behind its name, and its factor from SI."""
+        if name not in FITNESS or FITNESS[name].unit != "signal":
+            return "", 1.0
+        unit, factor = scale_of(self.unit)
+        return f" [{unit}]", factor
 
     def of(self, setting: str) -> DataFrame:
         return self.runs[self.runs["setting"] == setting]
@@ -338,14 +350,6 @@ def noise_text(level: float, unit: str = SPEED_UNIT) -> str:
     if np.isnan(level):
         return "as recorded"
     return WITHOUT_NOISE if level == 0.0 else f"{level:g} {NOISES[unit].replace('_s', '/s')}"
-
-
-def fitness_scale(name: str, unit: str) -> tuple[str, float]:
-    """Return the unit of a fitness as it is written behind its name, and its factor from SI; unit: of the records."""
-    if name not in FITNESS or FITNESS[name].unit != "signal":
-        return "", 1.0
-    shown_unit, factor = scale_of(unit)
-    return f" [{shown_unit}]", factor
 
 
 def ordered(runs: DataFrame, study: dict[str, Any]) -> DataFrame:

@@ -44,8 +44,6 @@ FIGURE_CAPTION = "Mean ranks over the cases. A bar joins identifiers that do not
 
 
 def parts(evidence: Evidence) -> Sequence[Part]:
-    if not evidence.knows_truth or len(evidence.variants) < 2 or len(evidence.cases) < 2:
-        return ()
     tables, figures, said = [], [], []
     for setting in evidence.settings:
         tests, reached = evidence.once(compared, setting)
@@ -67,7 +65,8 @@ def compared(evidence: Evidence, setting: str) -> tuple["RankTests", Series]:
     return rank_tests(evidence.of(setting), steps_of(evidence, setting)), arrived(evidence, setting)
 
 
-RANKS = Analysis("ranks", "Ranks", parts, "which identifiers differ: Friedman, Wilcoxon with Holm, effect sizes")
+RANKS = Analysis("ranks", "Ranks", parts, "which identifiers differ: Friedman, Wilcoxon with Holm, effect sizes",
+                 lambda e: e.knows_truth and min(len(e.variants), len(e.cases)) > 1)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -293,8 +292,8 @@ N_BOOTSTRAP = 1000
 
 
 BY_CLASS = Analysis("by_class", "Ranks by class of difficulty", lambda evidence: (
-    (class_ranks(evidence), swarm_pairs(evidence), problems(evidence)) if evidence.is_suite else ()
-), "who is best on which problems of a suite")  # fmt: skip
+    class_ranks(evidence), swarm_pairs(evidence), problems(evidence),
+), "who is best on which problems of a suite", lambda evidence: evidence.is_suite)  # fmt: skip
 
 
 def final_values(evidence: Evidence, setting: str) -> DataFrame:
