@@ -9,7 +9,6 @@ parameter's interval, 1 % of the noise for an RMSE, 1e-3 for a similarity (1 at 
 import csv
 import json
 import sqlite3
-import subprocess
 import sys
 from contextlib import closing
 from io import StringIO
@@ -20,6 +19,7 @@ import pytest
 import armid
 from armid.report.files import csv as text_of
 from armid.study.document import report_of
+from commands import python
 
 ROOT = Path(__file__).parents[1]
 GOLDEN = ROOT / "tests" / "golden"
@@ -179,8 +179,9 @@ def test_the_small_blind_suite(tmp_path):
     only = f"only = {list(wanted)}\n"
     (tmp_path / "blind_short.toml").write_text(only + text, encoding="utf-8")
     campaigns = tmp_path / "campaigns" / "blind_short"
-    stand, suite = ROOT / "studies" / "test_stand.py", ROOT / "studies" / "blind_short.toml"
-    subprocess.run([sys.executable, stand, "blind", campaigns, "--seed", "1", "--suite", suite], check=True)
+    suite = ROOT / "studies" / "blind_short.toml"
+    stood = python(ROOT / "studies" / "test_stand.py", "blind", campaigns, "--seed", "1", "--suite", suite)
+    assert stood.returncode == 0, stood.stderr
     armid.run_study(tmp_path / "blind_short.toml", jobs=1, out=tmp_path / "out")
     assert blind_digest(tmp_path / "out" / "study.sqlite") == wanted
 
