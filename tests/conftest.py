@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -274,16 +275,18 @@ def write_axis():
 
 @pytest.fixture(scope="session")
 def stand(tmp_path_factory):
-    """Return a function that makes a campaign with studies/test_stand.py; the same options are made once."""
-    made = {}
+    """Return a function that makes a campaign with studies/test_stand.py.
 
+    The same options are made once, and a motion that several campaigns record with other sensors is simulated once.
+    """
+    from stand import command
+
+    @cache
     def campaign(*options):
-        if options not in made:
-            from stand.command import main
+        folder = tmp_path_factory.mktemp("stand") / "made"
+        assert command.main([str(folder), *options]) == 0
+        return folder
 
-            folder = tmp_path_factory.mktemp("stand") / "made"
-            assert main([str(folder), *options]) == 0
-            made[options] = folder
-        return made[options]
-
-    return campaign
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(command, "simulate", cache(command.simulate))
+        yield campaign

@@ -237,7 +237,7 @@ LACKING = (
     "rocking_hz=5", "coulomb=80 supply_sag=0.015 tilt_deg=3 viscous=20",
 )  # fmt: skip
 SENSORS = ("--noise-deg-s 5", "--noise-bandwidth-hz 40 --noise-deg-s 2", "--quantisation-deg-s 2", "--rest 1.0",
-           "--repeats 1 --holdout  --manoeuvres inside_E", "--duration 0.4",
+           "--holdout  --manoeuvres inside_E", "--repeats 3 --duration 0.4",
            "--noise-deg-s 0 --quantisation-deg-s 0")  # fmt: skip
 # Few records, of which no majority says which are right.
 PAIRS = ("lower,raise", "raise,short", "lower,empty,raise_empty")
@@ -246,11 +246,12 @@ COMMITTED = ("four_strokes", "one_stroke", "rocking_shell", "table1_stand/row_5"
 
 @pytest.mark.slow
 def test_right_campaigns_are_not_accused(root, stand, tmp_path):
-    options = [("--repeats", "1", "--duration", "0.8", "--effect", *effects.split()) for effects in LACKING]
-    options += [tuple(text.split(" ")) for text in SENSORS]
-    options += [("--repeats", "1", "--holdout", "", "--seed", str(4100 + i), "--manoeuvres", PAIRS[i % len(PAIRS)],
+    options = [("--effect", *effects.split()) for effects in LACKING] + [text.split(" ") for text in SENSORS]
+    options += [("--holdout", "", "--seed", str(4100 + i), "--manoeuvres", PAIRS[i % len(PAIRS)],
                  "--effect", *effects.split()) for i, effects in enumerate(LACKING[::3])]  # fmt: skip
-    folders = [stand(*words) for words in options] + [root / "studies" / "campaigns" / name for name in COMMITTED]
+    folders = [stand("--repeats", "1", "--duration", "0.8", *words) for words in options] + [
+        root / "studies" / "campaigns" / name for name in COMMITTED
+    ]
     folders += [pendulum(tmp_path / f"p{i}", i, friction) for i, friction in enumerate((0.0, 0.03, 0.1))]
     shutil.copytree(root / "studies" / "campaigns" / "paper_arm", tmp_path / "arm")
     folders += [halves(pendulum(tmp_path / "parts"), ("window_s = [0, 1.5]", "window_s = [1.6, 3]")),

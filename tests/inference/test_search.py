@@ -20,7 +20,7 @@ from armid.inference.search import BEAM, MOST_EFFECTS, Exploration, drops, has_t
 from armid.model import EFFECTS, Model
 from armid.record import read_campaign
 
-MANOEUVRES = ("--manoeuvres", "lower,raise,short,empty", "--holdout", "", "--repeats", "1", "--duration", "1.0")
+MANOEUVRES = ("--manoeuvres", "lower,raise,short,empty", "--holdout", "", "--repeats", "1", "--duration", "0.8")
 # Candidates of one compiled model, of which a test asks for some.
 FEW = ("coulomb", "flux_saturation", "stribeck", "supply_sag")
 
