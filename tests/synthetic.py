@@ -21,6 +21,15 @@ def moved(rates, drive, interval, start, hold="linear", substeps=1):
     return np.array(states)
 
 
+def wheel(drive, interval, gain, damping):
+    """Return speed and angle of dv/dt = gain u - damping v from rest, exact where the drive is held."""
+    speed, angle, kept = [0.0], [0.0], np.exp(-damping * interval)
+    for u in drive[:-1]:
+        speed.append(kept * speed[-1] + gain / damping * (1.0 - kept) * u)
+        angle.append(angle[-1] + 0.5 * interval * (speed[-2] + speed[-1]))
+    return np.array(speed), np.array(angle)
+
+
 def write_records(folder, head, tables, holdout=1):
     """Write a campaign of some files, the last of them held out; return its folder."""
     roles = ["train"] * (len(tables) - holdout) + ["holdout"] * holdout

@@ -10,13 +10,7 @@ import pytest
 from armid.report.style import MOST_COLOURED, PALE, named_lines, panels
 from armid.study.analyses.analysis import TARGETS
 from armid.study.analyses.convergence import convergence_figure, median
-from armid.study.analyses.success import (
-    ecdf_figure,
-    expected_running_time,
-    running_time,
-    share_hit,
-    waterfall_figure,
-)
+from armid.study.analyses.success import ecdf_figure, expected_running_time, running_time, share_hit, waterfall_figure
 
 
 def named(axis):

@@ -10,7 +10,6 @@ from pymoo.algorithms.soo.nonconvex.nelder import NelderMead
 from pymoo.optimize import minimize
 from searches import Bowl, asked_of, identifier, ran
 
-from armid.estimation.identify import identify
 from armid.identifiers import IDENTIFIERS, as_identifier, identifier_of
 from armid.identifiers.catalogue import spread
 from armid.problem.fitness import FITNESS
@@ -154,14 +153,3 @@ def test_all_four_within_a_millionth_of_the_truth(stand, arm, truth, name):
         minimize(problem, identifier(name).build(3000), MeterTermination(meter), seed=seed, copy_algorithm=False)
         assert np.abs(meter.best_x / truth - 1.0).max() < 1e-6
         assert meter.used < 3000
-
-
-def test_one_run_from_a_chain(lowering, arm, arm_space):
-    found = identify(lowering, arm, arm_space, FITNESS["likelihood"], identifier("pso+least_squares"), 400, seed=3)
-    assert found.identifier == "pso+least_squares"
-    assert 200 < found.used < 400
-    assert found.stopped == "pso+least_squares stopped by itself"
-    alone = identify(lowering, arm, arm_space, FITNESS["likelihood"], identifier("least_squares"), 400, seed=4)
-    assert alone.used < 100
-    assert found.value == pytest.approx(alone.value, rel=1e-9)
-    np.testing.assert_allclose(found.candidate, alone.candidate, rtol=1e-5)

@@ -2,12 +2,10 @@
 
 import copy
 import pickle
-import threading
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
 from pymoo.problems import get_problem
 from pymoo.problems.functional import FunctionalProblem
@@ -25,22 +23,7 @@ from armid.problem.fitness import FITNESS
 from armid.problem.meter import Meter
 
 ALL = (*(n for n, i in IDENTIFIERS.items() if not i.package), *COMPOSED)
-ON_SCALARS = [name for name in ALL if "least_squares" not in name]
 OURS = [name for name in ALL if isinstance(identifier(name).build(10), SearchAlgorithm)]
-
-
-@pytest.mark.parametrize("name", ON_SCALARS)
-def test_works_on_pymoo_s_own_problem(name):
-    bests = []
-    told = {"seed": 1, "callback": lambda algorithm: bests.append(float(algorithm.opt[0].F[0]))}
-    problem = get_problem("rastrigin", n_var=3)
-    result = minimize(problem, identifier(name).build(250), ("n_eval", 250), **told)
-    assert 0 < result.algorithm.evaluator.n_eval < 250 + 80
-    assert np.all(np.abs(result.X) <= 5.12)
-    assert result.F[0] == bests[-1] == problem.evaluate(result.X)[0]
-    # the best of Sobol's points may be among the first
-    assert bests[-1] < bests[0] or name == "sobol"
-    assert bests == sorted(bests, reverse=True)
 
 
 @pytest.mark.parametrize("name", [name for name in ALL if "least_squares" in name])
@@ -96,30 +79,6 @@ def test_identifiers_travel_to_other_processes_and_algorithms_copy_before_they_r
     algorithm = pickle.loads(pickle.dumps(kept)).build(100)
     results = [minimize(Bowl(), a, ("n_eval", 100), seed=5).X for a in (copy.deepcopy(algorithm), algorithm)]
     np.testing.assert_array_equal(*results)
-
-
-class Broken(Problem):
-    """A bowl that raises after some batches."""
-
-    def __init__(self, error, after):
-        self.bowl, self.error, self.left = Bowl(), error, after
-        super().__init__(n_var=3, n_obj=1, xl=self.bowl.xl, xu=self.bowl.xu)
-
-    def _evaluate(self, X, out, *args, **kwargs):
-        self.left -= 1
-        if self.left < 0:
-            raise self.error
-        self.bowl._evaluate(X, out)
-
-
-@pytest.mark.parametrize("name", ["nelder_mead", "lbfgs", "least_squares", "multistart:bobyqa", "random+bobyqa"])
-def test_an_error_of_the_problem_comes_out_and_no_thread_is_left(name):
-    before = threading.enumerate()
-    for error, after in ((ZeroDivisionError("mine"), 0), (ZeroDivisionError("mine"), 5), (KeyboardInterrupt(), 5)):
-        with pytest.raises(type(error)) as came:
-            minimize(Broken(error, after), identifier(name).build(300), ("n_eval", 300), seed=1, copy_algorithm=False)
-        assert came.value is error
-        assert threading.enumerate() == before
 
 
 def test_what_minimize_would_swallow_and_more_offspring_than_parents_are_refused():

@@ -51,20 +51,10 @@ def test_the_old_way_declares_one_output_and_a_wrong_one_is_refused():
         Output("angle", "q", "deg")
     with pytest.raises(ArmidError, match="a name that ends in _deg or _rad"):
         Output("angle", "q", "rad", ("angle",))
-
-
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"output": "v"}, "one of them, or the first output 'recorded_speed' in rad/s"),
-        ({"outputs": two_inertias.outputs[:1] * 2}, "each name once"),
-        ({"outputs": (Output("a", "speeed", "rad/s"),), "output": ""}, "records 'speeed': did you mean"),
-        ({"outputs": (replace(two_inertias.outputs[0], port="sensor"),)}, "through the port 'sensor'"),
-    ],
-)
-def test_a_wrong_declaration_is_refused(changes, said):
-    with pytest.raises(ArmidError, match=said):
-        replace(two_inertias, **changes)
+    with pytest.raises(ArmidError, match="one of them, or the first output 'recorded_speed' in rad/s"):
+        replace(two_inertias, output="v")
+    with pytest.raises(ArmidError, match="each name once"):
+        replace(two_inertias, outputs=two_inertias.outputs[:1] * 2)
 
 
 @pytest.mark.slow
@@ -131,13 +121,10 @@ def test_every_state_of_the_start_comes_from_the_outputs_unless_it_is_given(tmp_
         read_campaign(write_drive(tmp_path / "again", more=f"{given}restart_s = 1.0\n"), {"two_inertias": two_inertias})
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (lambda text: text.replace("load_angle_deg", "load_angle_grad"), "load_angle_deg"),
-        (lambda text: text.replace("load_angle_deg", "motor_speed_deg_s", 1), "one column of motor_speed is expected"),
-    ],
-)
+@pytest.mark.parametrize(("change", "said"), [
+    (lambda text: text.replace("load_angle_deg", "load_angle_grad"), "load_angle_deg"),
+    (lambda text: text.replace("load_angle_deg", "motor_speed_deg_s", 1), "one column of motor_speed is expected"),
+])  # fmt: skip
 def test_columns_that_say_nothing_clear_are_refused(tmp_path, change, said):
     folder = write_drive(tmp_path / "drive")
     for name in "bc":

@@ -29,7 +29,6 @@ def records():
 
 def test_a_plain_function_becomes_a_fitness_and_what_it_returns_is_checked():
     x, rows = records()[0]
-    x, rows = records()[0]
     mine = as_fitness("mine", lambda measured, simulated: np.abs(simulated - measured).max(axis=1))
     assert (mine.name, mine.join, mine.finish) == ("mine", "duration", None)
     np.testing.assert_array_equal(mine(x, rows), np.abs(rows - x).max(axis=1))

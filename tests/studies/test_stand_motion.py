@@ -7,9 +7,8 @@ from functools import cache
 import numpy as np
 import pytest
 
-from arm_cases import REFERENCE, index_rows
 from stand import RefusalError
-from stand.arm import KNOWN, Arm, Manoeuvre
+from stand.arm import KNOWN, Arm
 from stand.effects import Effects
 from stand.gyro import Gyro, measure, noise, record_times
 from stand.motion import Motion, simulate
@@ -34,20 +33,6 @@ NAMELESS = ("asymmetric_friction", "worm_braking", "flux_root", "cam_bump",
 @cache
 def moved(effects=None, name="lower", duration_s=1.2):
     return simulate(Motion(Arm(), KNOWN[name], effects or Effects()), duration_s)
-
-
-@pytest.mark.parametrize("row", index_rows(), ids=lambda row: row["file"])
-def test_agrees_with_the_independent_integrator(row):
-    arm = Arm(float(row["p0_MPa"]) * 1e6, float(row["k"]), float(row["eta3"]), float(row["n"]))
-    stroke = float(row["start_angle_deg"]), float(row["target_angle_deg"])
-    manoeuvre = Manoeuvre(row["manoeuvre"], *stroke, row["shell"] == "1", float(row["supply_V"]))
-    found = simulate(Motion(arm, manoeuvre), 1.2)
-    time, angle, speed, current = np.loadtxt(REFERENCE / row["file"], delimiter=",", skiprows=1).T
-    assert np.allclose(found.time_s, time, rtol=0, atol=1e-12)
-    assert np.abs(found.states["angle"] - angle).max() < 1e-7
-    assert np.abs(found.states["speed"] - speed).max() < 1e-6
-    assert np.abs(found.states["current"] - current).max() < 1e-3
-    assert found.switch_s == pytest.approx(float(row["switch_time_s"]), abs=1e-9)
 
 
 def test_a_record_that_ends_before_the_switch_has_none_and_no_shell_does_not_rock():
