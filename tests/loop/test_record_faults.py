@@ -104,9 +104,9 @@ def test_a_parameter_that_rises_from_record_to_record_is_told(stand, campaign):
     rise, files = 0.03 * TRUTH["p0"], [r.file for r in campaign.train]
     there = {}
     for place, file in enumerate(files):
-        p0 = repr(TRUTH["p0"] + rise * (place / (len(files) - 1) - 0.5))
-        alone = ("--p0", p0, "--manoeuvres", file.removesuffix(".csv"), "--holdout", "")
-        (there[file],) = read_campaign(stand(*COMMON, *alone)).records
+        options = list(COMMON)
+        options[options.index("--p0") + 1] = repr(TRUTH["p0"] + rise * (place / (len(files) - 1) - 0.5))
+        there[file] = next(r for r in read_campaign(stand(*options)).records if r.file == file)
     records = tuple(there.get(r.file, r) for r in campaign.records)
     found = close_loop(Model(ARM), replace(campaign, records=records), CANDIDATES)
     (suspect,) = report_of(found)["suspects"]

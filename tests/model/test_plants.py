@@ -84,11 +84,11 @@ def test_what_is_known_roughly_is_corrected_wherever_it_stands():
     np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
-TIMES = 5e-3 * np.arange(201)
-# Lowering with the shell, the switch at 0.578 s, to 0.62 s; a light hanging axis under a sine that turns it over twice.
+TIMES = 5e-3 * np.arange(121)
+# A short lowering with the shell, beyond its switch at 0.14 s; a light hanging axis under a sine that turns it over.
 MOTIONS = {
-    "arm": (PLANTS["shell_transfer_arm"], Manoeuvre(5e-3, 125), {}),
-    "axis": (driven_axis, Manoeuvre(5e-3, 201, {"gravity_moment": 0.4, "start_speed": 0.1},
+    "arm": (PLANTS["shell_transfer_arm"], Manoeuvre(5e-3, 41, {"theta_D": math.radians(-20.0)}), {}),
+    "axis": (driven_axis, Manoeuvre(5e-3, 121, {"gravity_moment": 0.4, "start_speed": 0.1},
                                     {"u": 0.1 + 0.5 * np.sin(9 * TIMES)}), {"mass": 0.06}),
 }  # fmt: skip
 

@@ -21,7 +21,7 @@ question = "Does it name the effect?"
 campaigns = "suite"
 made_by = "make suite"
 key = "suite.key.json"
-candidates = ["supply_sag", "tilt", "viscous"]
+candidates = ["coulomb", "seal_friction", "supply_sag", "tilt", "viscous"]
 """
 
 

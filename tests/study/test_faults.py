@@ -110,11 +110,11 @@ def test_identifiers_that_misbehave_fail_alone(write_study, tmp_path, bad_identi
         "segfaults": "the worker process ended by SIGSEGV, 2 times",
         "interrupts": "the worker process ended with code 130, 2 times",
         "writes": "the worker process sent what is not a message of ours",
-        "hangs": "stopped at the time limit of 5 s",
+        "hangs": "stopped at the time limit of 3 s",
     }
     bad = "\n[[identifiers]]\n".join(f'name = "{name}"\nnoise_deg_s = 0.3' for name in errors)
     plugins = [f"{bad_identifiers}:{name}" for name in errors]
-    options = {"jobs": 2, "out": tmp_path / "out", "plugins": plugins, "only": "row 1", "time_limit": 5.0}
+    options = {"jobs": 2, "out": tmp_path / "out", "plugins": plugins, "only": "row 1", "time_limit": 3.0}
     found = run_study(write_study(1, change=(CHAIN, bad)), **options)
     failed = found.runs[found.runs["status"] == "failed"].set_index("identifier")["error"]
     assert {name: words for name, words in errors.items() if words in failed[name]} == errors
@@ -127,14 +127,14 @@ def test_identifiers_that_misbehave_fail_alone(write_study, tmp_path, bad_identi
 
 
 @pytest.mark.parametrize(("name", "words"), [
-    pytest.param("hangs", "stopped at the time limit of 4 s", marks=pytest.mark.slow),
+    pytest.param("hangs", "stopped at the time limit of 2 s", marks=pytest.mark.slow),
     ("raises", "ZeroDivisionError: division by zero"),
     ("segfaults", "the worker process ended by SIGSEGV, 2 times"),
 ])  # fmt: skip
 def test_what_a_factory_does_harms_no_runner(write_study, tmp_path, bad_identifiers, name, words):
     file = write_study(1, change=(CHAIN, f'name = "{name}_when_built"'))
     with pytest.raises(ArmidError, match=rf"identifier '{name}_when_built': it cannot be built: .*{words}"):
-        run_study(file, 1, out=tmp_path / "out", plugins=[f"{bad_identifiers}:{name}_when_built"], time_limit=4.0)
+        run_study(file, 1, out=tmp_path / "out", plugins=[f"{bad_identifiers}:{name}_when_built"], time_limit=2.0)
     assert not (tmp_path / "out").exists()
 
 

@@ -58,7 +58,7 @@ def test_another_plant_of_the_user_makes_other_runs_and_is_not_mistaken_for_the_
 
 
 def test_effects_of_a_sensor_are_looked_for_where_all_are(write):
-    chosen = 'candidates = ["supply_sag", "tilt", "viscous"]'
+    chosen = 'candidates = ["coulomb", "seal_friction", "supply_sag", "tilt", "viscous"]'
     each = {more: next(iter(read_study(write(text=STUDY.replace(chosen, more))).plan())).settings for more in
             ("", 'candidates = ["angle_bias"]', 'without = ["angle_bias", "coulomb"]')}  # fmt: skip
     whole, told, less = (json.loads(s) for s in each.values())
