@@ -3,7 +3,7 @@
 from input_texts import SUITE_HEAD
 
 SUITE = (
-    SUITE_HEAD.replace("[1.0, 1.1]", "[0.8, 0.85]")
+    SUITE_HEAD
     + """\
 [[suite.effects]]
 name = "supply_sag"
