@@ -161,12 +161,12 @@ def test_identifying(name, paper_arm_folder):
 
 @pytest.mark.slow
 def test_the_small_table(tmp_path):
-    """Two of its five rows: on the others the same searches do the same."""
-    results = armid.run_study(ROOT / "studies" / "table1_short.toml", jobs=1, out=tmp_path, only="row [25]")
+    """One of its five rows: on the others the same searches do the same."""
+    results = armid.run_study(ROOT / "studies" / "table1_short.toml", jobs=1, out=tmp_path, only="row 5")
     table = next(each for each in report_of(results).tables if each.name == "table1")
-    found, wanted = ([row for row in digest if row[1] in ("row 2", "row 5")]
+    found, wanted = ([row for row in digest if row[1] == "row 5"]
                      for digest in (table_digest(text_of(table)), golden("table1_short")))  # fmt: skip
-    assert len(found) == 2 * 5 * 4
+    assert len(found) == 5 * 4
     assert [row[:4] for row in found] == [row[:4] for row in wanted]
     for (*what, truth, published, median, error), (*_, truth_then, published_then, median_then, error_then) in zip(
         found, wanted, strict=True

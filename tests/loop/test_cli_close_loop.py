@@ -10,7 +10,7 @@ from few_candidates import CANDIDATES, COMMON
 
 from armid.estimation.least_squares import descend
 from armid.model import EFFECTS
-from commands import ended, not_drawn
+from commands import ended
 
 IN_ONE_THREAD = ("--candidates", "viscous,drive_gain", "--threads", 1)
 
@@ -62,16 +62,14 @@ def whole(write_axis, axis_speed, tmp_path_factory):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("armid.inference.model.descend", counted)
-        patch.setattr("armid.report.files.save", not_drawn)
         assert ended("close-loop", campaign, "--out", out, *IN_ONE_THREAD) == 0
     assert not (out / "progress.jsonl").exists()
     return campaign, (out / "report.json").read_bytes(), len(made)
 
 
 @pytest.mark.slow
-def test_the_result_is_the_same_on_any_number_of_threads(whole, tmp_path, monkeypatch):
+def test_the_result_is_the_same_on_any_number_of_threads(whole, tmp_path):
     campaign, report, _ = whole
-    monkeypatch.setattr("armid.report.files.save", not_drawn)
     assert ended("close-loop", campaign, "--out", tmp_path, *IN_ONE_THREAD[:-1], 3) == 0
     assert (tmp_path / "report.json").read_bytes() == report
     assert json.loads(report)["effects"] == ["viscous"]
@@ -89,7 +87,6 @@ def test_what_is_cut_off_goes_on_from_its_fits_to_the_same_result(whole, tmp_pat
         return descend(*given, **options)
 
     monkeypatch.setattr("armid.inference.model.descend", counted)
-    monkeypatch.setattr("armid.report.files.save", not_drawn)
     stop_at = n_whole - 5
     assert ended("close-loop", campaign, "--out", tmp_path, *IN_ONE_THREAD) == 130
     kept = tmp_path / "progress.jsonl"

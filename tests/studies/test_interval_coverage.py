@@ -25,7 +25,6 @@ def test_coverage_width_and_bias_are_those_of_the_intervals_that_are_given():
 
 @pytest.mark.slow
 def test_two_noises_of_a_machine_and_its_twin(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("armid.estimation.bootstrap.FIRST_DRAWS", 25)
     monkeypatch.setattr(interval_coverage, "arm", lambda: axis()._replace(name="twin"))
     monkeypatch.setattr(interval_coverage, "FITNESSES", {name: FITNESSES[name] for name in ("rmse", "minimax")})
     words = ["interval_coverage.py", "--out", str(tmp_path), "--noises", "2"]
