@@ -4,24 +4,22 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, settings
 from numba.core import event
-from numpy.typing import NDArray
 
 from armid import errors
 from armid.cli.new import campaign_text, synthetic_records
 from armid.model import EFFECTS, Model
-from armid.problem.problem import Replay, replays
-from armid.problem.space import Space, space_of
-from armid.record import Campaign, read_campaign, write_campaign, write_table
-from commands import ended
+from armid.problem.problem import replays
+from armid.problem.space import space_of
+from armid.record import read_campaign, write_campaign, write_table
+from commands import ended, remount
 from input_texts import TABLE_STUDY
 
 # How fast inputs are made hangs on what else the machine does.
@@ -31,7 +29,7 @@ ROOT = Path(__file__).parents[1]
 # Fast tests, or other loops, run the lines of these folders, files and tests too: their slow ones go without the tracer
 # of coverage, which makes them up to twice as long.
 NOT_TRACED = (
-    "bench", "contract", "engine", "identifiers", "model", "problem", "test_golden_outputs.py",
+    "bench", "contract", "engine", "identifiers", "model", "problem", "studies", "test_golden_outputs.py",
     "test_a_mistake_is_named", "test_a_right_campaign_is_not_accused", "test_right_campaigns_are_not_accused",
     "test_holdout_records_decide_nothing", "test_the_advised_record_tells_apart_and_beats_a_random_one",
     "test_finds_on_one_stroke_what_the_paper_found", "test_another_form_of_an_effect_takes_its_place",
@@ -45,7 +43,6 @@ LONGEST = (
     "test_every_snippet_runs_and_every_output_is_true", "test_right_campaigns_are_not_accused",
     "test_closing_the_loop",
 )  # fmt: skip
-Array = NDArray[np.float64]
 AXIS_TOML = """\
 name = "axis"
 plant = "driven_axis"
@@ -56,13 +53,13 @@ role = "train"
 
 
 @pytest.fixture(scope="session")
-def root() -> Path:
+def root():
     """The repository's root."""
     return ROOT
 
 
 @pytest.fixture(scope="session", autouse=True)
-def no_word_of_compiling() -> Iterator[None]:
+def no_word_of_compiling():
     """What compiling takes hangs on the cache and the machine: commands in this process do not announce it."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("armid.progress.SLOW_S", 1e6)
@@ -75,22 +72,22 @@ class Untraced(event.Listener):
     tests/engine/test_simd_math.py compiles every operation, so that what makes machine code is seen to run there.
     """
 
-    def __init__(self) -> None:
-        self.tracers: list[Any] = []
+    def __init__(self):
+        self.tracers = []
 
-    def on_start(self, event: Any) -> None:
+    def on_start(self, event):
         self.tracers.append(sys.gettrace())
         if "test_simd_math.py" not in os.environ.get("PYTEST_CURRENT_TEST", ""):
             sys.settrace(None)
 
-    def on_end(self, event: Any) -> None:
+    def on_end(self, event):
         sys.settrace(self.tracers.pop())
 
 
 event.register("numba:compile", Untraced())
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_collection_modifyitems(items):
     """Put the longest tests first, and mark the slow ones that coverage leaves out."""
     items.sort(key=lambda item: item.name.partition("[")[0] not in LONGEST)
     for item in items:
@@ -100,7 +97,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 @pytest.hookimpl(wrapper=True)
-def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+def pytest_runtest_protocol(item):
     """Leave out of coverage what a slow test starts: workers, which end without telling theirs, and examples."""
     with pytest.MonkeyPatch.context() as patch:
         if item.get_closest_marker("slow"):
@@ -118,10 +115,10 @@ class Ran:
 
 
 @pytest.fixture
-def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., Ran]:
+def run(capsys):
     """Return a function that runs a command in this process."""
 
-    def ran(*arguments: object) -> Ran:
+    def ran(*arguments):
         code = ended(*arguments)
         return Ran(code, *capsys.readouterr())
 
@@ -129,10 +126,10 @@ def run(capsys: pytest.CaptureFixture[str]) -> Callable[..., Ran]:
 
 
 @pytest.fixture
-def refused(run: Callable[..., Ran]) -> Callable[..., str]:
+def refused(run):
     """Return a function that runs a command that has to be refused, and returns its one sentence."""
 
-    def sentence(*arguments: object) -> str:
+    def sentence(*arguments):
         ran = run(*arguments)
         assert (ran.code, ran.out) == (2, "")
         assert ran.err.startswith("armid: ")
@@ -144,18 +141,18 @@ def refused(run: Callable[..., Ran]) -> Callable[..., str]:
 
 
 @pytest.fixture
-def disk(tmp_path: Path) -> Iterator[Callable[..., Path]]:
+def disk(tmp_path):
     """Return a function that makes a file system of some size, which only root may do."""
     folder = tmp_path / "disk"
     folder.mkdir()
 
-    def mounted(size: str, *, read_only: bool = False) -> Path:
+    def mounted(size, *, read_only=False):
         command = ["mount", "-t", "tmpfs", "-o", f"size={size}", "tmpfs", str(folder)]
         if shutil.which("mount") is None or subprocess.run(command, check=False, capture_output=True).returncode:
             pytest.skip("a small file system cannot be mounted here")
         if read_only:
             (folder / "kept").write_text("kept")
-            subprocess.run(["mount", "-o", "remount,ro", str(folder)], check=True)
+            remount(folder, "ro")
         return folder
 
     yield mounted
@@ -163,11 +160,11 @@ def disk(tmp_path: Path) -> Iterator[Callable[..., Path]]:
 
 
 @pytest.fixture(scope="session")
-def every_command() -> dict[tuple[str, ...], Any]:
+def every_command():
     """The words that call a command -> the command, of every command of armid."""
     from armid.cli.main import app
 
-    def below(group: Any, words: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Any]]:
+    def below(group, words):
         for name in group.list_commands(None):
             command = group.get_command(None, name)
             if hasattr(command, "commands"):
@@ -179,51 +176,51 @@ def every_command() -> dict[tuple[str, ...], Any]:
 
 
 @pytest.fixture(scope="session")
-def paper_arm_folder() -> Path:
+def paper_arm_folder():
     """Folder of the committed synthetic campaign."""
     return ROOT / "studies" / "campaigns" / "paper_arm"
 
 
 @pytest.fixture(scope="session")
-def paper_arm(paper_arm_folder: Path) -> Campaign:
+def paper_arm(paper_arm_folder):
     """The committed synthetic campaign: lower (three times), raise, short; empty and low voltage held out."""
     return read_campaign(paper_arm_folder)
 
 
 @pytest.fixture(scope="session")
-def arm(paper_arm: Campaign) -> Model:
+def arm(paper_arm):
     """The declared arm."""
     return Model(paper_arm.plant)
 
 
 @pytest.fixture(scope="session")
-def arm_space(arm: Model) -> Space:
+def arm_space(arm):
     """Its box as declared."""
     return space_of(arm)
 
 
 @pytest.fixture(scope="session")
-def lowering(paper_arm: Campaign) -> Campaign:
+def lowering(paper_arm):
     """One lowering to train on, cut at 0.7 s, and one to hold out."""
     train, holdout = paper_arm.train[0], paper_arm.holdout[1]
     return replace(paper_arm, records=(train, holdout)).with_window(0.0, 0.7)
 
 
 @pytest.fixture(scope="session")
-def lowering_replays(lowering: Campaign, arm: Model, arm_space: Space) -> tuple[Replay, ...]:
+def lowering_replays(lowering, arm, arm_space):
     """The lowering ready to be simulated."""
     return replays(lowering.train, arm, arm_space)
 
 
 @pytest.fixture(scope="session")
-def synthetic_axis(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def synthetic_axis(tmp_path_factory):
     """Folder of the campaign that `armid new` writes."""
     folder = tmp_path_factory.mktemp("synthetic") / "axis"
     return write_campaign(folder, campaign_text("axis"), synthetic_records())
 
 
 @pytest.fixture(scope="session")
-def table_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def table_study(tmp_path_factory):
     """Folder of a study of Table I with its four runs in out; who writes into it works on a copy."""
     from armid.study.runner import run_study
 
@@ -234,39 +231,37 @@ def table_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def store(table_study: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def store(table_study, tmp_path_factory):
     """Folder of the runs of a copy of that study, for one file of tests."""
     return shutil.copytree(table_study, tmp_path_factory.mktemp("stored") / "tiny") / "out"
 
 
-def step_response(times: Array, mass: float = 2.0, slope: float = 5.0, drive: float = 8.0) -> Array:
+def step_response(times, mass=2.0, slope=5.0, drive=8.0):
     """Return the speed of an axis with viscous friction under a constant drive from rest, F/c (1 - exp(-c t/m))."""
     return drive / slope * (1.0 - np.exp(-slope * times / mass))
 
 
 @pytest.fixture(scope="session")
-def axis_speed() -> Callable[..., Array]:
+def axis_speed():
     """The closed form `step_response`."""
     return step_response
 
 
 @pytest.fixture(scope="session")
-def axis_model(write_axis: Callable[..., Path], tmp_path_factory: pytest.TempPathFactory) -> Model:
+def axis_model(write_axis, tmp_path_factory):
     """An axis with viscous friction, scaled as the step response of the defaults asks for."""
     return Model(read_campaign(write_axis(tmp_path_factory.mktemp("axis"))).plant) + EFFECTS["viscous"]
 
 
 @pytest.fixture(scope="session")
-def write_axis() -> Callable[..., Path]:
+def write_axis():
     """Return a function that writes a campaign of an axis, driven by a constant 8 N from rest for 2 s at 200 Hz.
 
     folder: where; velocity: what is recorded [m/s], (401,), None: the step response without noise; more: text for
     campaign.toml; others: further records, file -> velocity.
     """
 
-    def write(
-        folder: Path, velocity: Array | None = None, more: str = "", others: Mapping[str, Array] | None = None
-    ) -> Path:
+    def write(folder, velocity=None, more="", others=None):
         times = np.arange(401) / 200.0
         recorded = {"move.csv": step_response(times) if velocity is None else velocity, **(others or {})}
         folder.mkdir(parents=True, exist_ok=True)
@@ -279,17 +274,19 @@ def write_axis() -> Callable[..., Path]:
 
 
 @pytest.fixture(scope="session")
-def stand(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
-    """Return a function that makes a campaign with studies/test_stand.py; the same options are made once."""
-    made: dict[tuple[str, ...], Path] = {}
+def stand(tmp_path_factory):
+    """Return a function that makes a campaign with studies/test_stand.py.
 
-    def campaign(*options: str) -> Path:
-        if options not in made:
-            from stand.command import main
+    The same options are made once, and a motion that several campaigns record with other sensors is simulated once.
+    """
+    from stand import command
 
-            folder = tmp_path_factory.mktemp("stand") / "made"
-            assert main([str(folder), *options]) == 0
-            made[options] = folder
-        return made[options]
+    @cache
+    def campaign(*options):
+        folder = tmp_path_factory.mktemp("stand") / "made"
+        assert command.main([str(folder), *options]) == 0
+        return folder
 
-    return campaign
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(command, "simulate", cache(command.simulate))
+        yield campaign

@@ -1,7 +1,6 @@
 """Texts that several folders of tests write into files: a lowering, the head of a blind suite, a study, any table."""
 
 import json
-from typing import Any
 
 LOWERING = """\
 [[records]]
@@ -58,7 +57,7 @@ n = [0.9, 1.5]
 """
 
 
-def on_one_line(value: Any) -> str:
+def on_one_line(value):
     """Return a value as TOML has it on one line."""
     if isinstance(value, bool):
         return str(value).lower()
@@ -72,5 +71,5 @@ def on_one_line(value: Any) -> str:
     return repr(value)
 
 
-def toml_of(table: dict[str, Any]) -> bytes:
+def toml_of(table):
     return "".join(f"{on_one_line(str(k))} = {on_one_line(v)}\n" for k, v in table.items()).encode()

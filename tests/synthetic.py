@@ -1,19 +1,13 @@
 """SYNTHETIC campaigns: motions by steps of their own, no line of the engine in them, and the text that names files."""
 
-from collections.abc import Callable, Mapping
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from armid.record import write_campaign
 
-Array = NDArray[np.float64]
 
-
-def moved(rates: Callable[..., Array], drive: Array, interval: float, start: Array | tuple[float, ...],
-          hold: str = "linear", substeps: int = 1) -> Array:  # fmt: skip
+def moved(rates, drive, interval, start, hold="linear", substeps=1):
     """Return the states at the samples, (n_samples, n_states), of dx/dt = rates(x, drive), by Runge-Kutta steps."""
     states, h = [np.asarray(start, dtype=float)], interval / substeps
     for now, after in pairwise(drive):
@@ -27,7 +21,16 @@ def moved(rates: Callable[..., Array], drive: Array, interval: float, start: Arr
     return np.array(states)
 
 
-def write_records(folder: Path, head: str, tables: Mapping[str, Mapping[str, Array]], holdout: int = 1) -> Path:
+def wheel(drive, interval, gain, damping):
+    """Return speed and angle of dv/dt = gain u - damping v from rest, exact where the drive is held."""
+    speed, angle, kept = [0.0], [0.0], np.exp(-damping * interval)
+    for u in drive[:-1]:
+        speed.append(kept * speed[-1] + gain / damping * (1.0 - kept) * u)
+        angle.append(angle[-1] + 0.5 * interval * (speed[-2] + speed[-1]))
+    return np.array(speed), np.array(angle)
+
+
+def write_records(folder, head, tables, holdout=1):
     """Write a campaign of some files, the last of them held out; return its folder."""
     roles = ["train"] * (len(tables) - holdout) + ["holdout"] * holdout
     entries = [f'[[records]]\nfile = "{file}"\nrole = "{role}"\n' for file, role in zip(tables, roles, strict=True)]

@@ -3,6 +3,7 @@
 import inspect
 import logging
 import os
+import re
 import sys
 from pathlib import Path
 from shutil import copytree
@@ -239,9 +240,15 @@ def test_a_folder_whose_name_is_no_utf_8(found, tmp_path, run):
 
 
 @pytest.mark.parametrize(("call", "said"), [
+    (lambda a: armid.identify("nowhere"), "DataError.*'nowhere' does not exist"),
+    (lambda a: armid.identify({"x": pd.DataFrame({"time_s": [0.0]})}, plant="driven_axis"), "DataError"),
+    (lambda a: armid.identify(a, effects=["viscos"]), "ModelError.*'viscos'"),
+    (lambda a: armid.Model(PLANTS["driven_axis"]) - "coulomb", "ModelError.*'coulomb'"),
+    (lambda a: armid.Effect("mine", (), {}), "ModelError.*'mine'"),
+    (lambda a: armid.load_study("nowhere"), "StudyError"),
     (lambda a: armid.identify(a, fitness=3), "3"),
     (lambda a: armid.identify(a, identifier=3), "is 3, expected"),
-    (lambda a: armid.close_loop(a, without=["viscos"]), "^without: effect 'viscos' is not known"),
+    (lambda a: armid.close_loop(a, without=["viscos"]), ": without: effect 'viscos' is not known"),
     (lambda a: armid.close_loop(armid.Model(PLANTS["driven_axis"])), "a Model and its campaign"),
     (lambda a: armid.simulate(armid.Model(PLANTS["driven_axis"])), "a manoeuvre and a population are expected"),
     (lambda a: armid.set_log_level("loud"), "debug, info, warning, error"),
@@ -264,25 +271,12 @@ def test_a_folder_whose_name_is_no_utf_8(found, tmp_path, run):
     (lambda a: armid.simulate(a, inertai=0.05), "did you mean 'inertia'"),
     (lambda a: armid.simulate(a, inertia="much"), "a finite number is expected"),
 ])  # fmt: skip
-def test_what_is_wrong_is_one_sentence(axis, call, said):
-    with pytest.raises(ArmidError, match=said) as caught:
+def test_what_is_wrong_is_one_sentence_of_an_exception_that_says_its_cause(axis, call, said):
+    with pytest.raises(ArmidError) as caught:
         call(axis)
+    assert re.search(said, f"{type(caught.value).__name__}: {caught.value}")
     assert "\n" not in str(caught.value)
     assert "--" not in str(caught.value)
-
-
-@pytest.mark.parametrize(("kind", "call"), [
-    (armid.DataError, lambda a: armid.identify("nowhere")),
-    (armid.DataError, lambda a: armid.identify({"x": pd.DataFrame({"time_s": [0.0]})}, plant="driven_axis")),
-    (armid.ModelError, lambda a: armid.identify(a, effects=["viscos"])),
-    (armid.ModelError, lambda a: armid.Model(PLANTS["driven_axis"]) - "coulomb"),
-    (armid.ModelError, lambda a: armid.Effect("mine", (), {})),
-    (armid.StudyError, lambda a: armid.load_study("nowhere")),
-])  # fmt: skip
-def test_an_exception_says_its_cause(axis, kind, call):
-    with pytest.raises(kind) as caught:
-        call(axis)
-    assert isinstance(caught.value, ArmidError)
 
 
 @pytest.mark.parametrize("name", ["identify", "simulate", "examine", "close_loop", "run_study", "read_campaign"])

@@ -9,7 +9,6 @@ parameter's interval, 1 % of the noise for an RMSE, 1e-3 for a similarity (1 at 
 import csv
 import json
 import sqlite3
-import subprocess
 import sys
 from contextlib import closing
 from io import StringIO
@@ -20,12 +19,14 @@ import pytest
 import armid
 from armid.report.files import csv as text_of
 from armid.study.document import report_of
+from stand.blind import campaign
 
 ROOT = Path(__file__).parents[1]
 GOLDEN = ROOT / "tests" / "golden"
 CAMPAIGNS = ("paper_arm", "one_stroke", "four_strokes", "rocking_shell")
 IDENTIFIERS = ("pso", "de", "cmaes", "bobyqa", "least_squares", "pso+least_squares")
 FAST = ("least_squares", "pso+least_squares")
+INTERVALS = ("pso", *FAST)
 # Of the blind campaigns one for each answer that the loops above do not give: the others take minutes.
 BLIND = ("c000", "c003", "c011")
 
@@ -147,9 +148,12 @@ def test_closing_the_loop(name):
 
 @pytest.mark.parametrize("name", [n if n in FAST else pytest.param(n, marks=pytest.mark.slow) for n in IDENTIFIERS])
 def test_identifying(name, paper_arm_folder):
-    fitness = "rmse" if "least_squares" in name else "similarity"
-    result = armid.identify(paper_arm_folder, identifier=name, fitness=fitness, budget=1500, seed=3)
+    fitness, told = "rmse" if "least_squares" in name else "similarity", {"budget": 1500, "seed": 3}
+    # the intervals of a similarity take long, and do not hang on who found the estimate
+    result = armid.identify(paper_arm_folder, identifier=name, fitness=fitness, interval=name in INTERVALS, **told)
     found, wanted = identified_digest(reported(result)), golden("identified")[name]
+    for entry in (e for of in (found, wanted) if name not in INTERVALS for e in of["parameters"].values()):
+        entry |= {"low": None, "high": None}
     # A trust region ends some steps earlier or later on another processor (281 to 361 simulations were seen).
     assert found.pop("used") == pytest.approx(wanted.pop("used"), rel=0.5)
     assert_same(found, wanted)
@@ -157,9 +161,12 @@ def test_identifying(name, paper_arm_folder):
 
 @pytest.mark.slow
 def test_the_small_table(tmp_path):
-    results = armid.run_study(ROOT / "studies" / "table1_short.toml", jobs=1, out=tmp_path)
+    """One of its five rows: on the others the same searches do the same."""
+    results = armid.run_study(ROOT / "studies" / "table1_short.toml", jobs=1, out=tmp_path, only="row 5")
     table = next(each for each in report_of(results).tables if each.name == "table1")
-    found, wanted = table_digest(text_of(table)), golden("table1_short")
+    found, wanted = ([row for row in digest if row[1] == "row 5"]
+                     for digest in (table_digest(text_of(table)), golden("table1_short")))  # fmt: skip
+    assert len(found) == 5 * 4
     assert [row[:4] for row in found] == [row[:4] for row in wanted]
     for (*what, truth, published, median, error), (*_, truth_then, published_then, median_then, error_then) in zip(
         found, wanted, strict=True
@@ -173,14 +180,16 @@ def test_the_small_table(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_small_blind_suite(tmp_path):
+def test_the_small_blind_suite(tmp_path, monkeypatch):
     wanted = {case: said for case, said in golden("blind_short").items() if case in BLIND}
     text = (ROOT / "studies" / "blind_short.toml").read_text(encoding="utf-8")
     only = f"only = {list(wanted)}\n"
     (tmp_path / "blind_short.toml").write_text(only + text, encoding="utf-8")
     campaigns = tmp_path / "campaigns" / "blind_short"
-    stand, suite = ROOT / "studies" / "test_stand.py", ROOT / "studies" / "blind_short.toml"
-    subprocess.run([sys.executable, stand, "blind", campaigns, "--seed", "1", "--suite", suite], check=True)
+    shuffled = campaign.shuffled
+    monkeypatch.setattr(campaign, "shuffled", lambda *of: {n: c for n, c in shuffled(*of).items() if n in wanted})
+    words = [str(campaigns), "--seed", "1", "--suite", str(ROOT / "studies" / "blind_short.toml"), "--processes", "1"]
+    assert campaign.main(words) == 0
     armid.run_study(tmp_path / "blind_short.toml", jobs=1, out=tmp_path / "out")
     assert blind_digest(tmp_path / "out" / "study.sqlite") == wanted
 

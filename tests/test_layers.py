@@ -5,14 +5,13 @@ import importlib
 import inspect
 import pkgutil
 import re
-import subprocess
-import sys
 from collections import defaultdict
 from pathlib import Path
 
 import click
 
 import armid
+from commands import python
 
 ROOT = Path(__file__).parents[1] / "src" / "armid"
 # A folder or file may import only what stands before it.
@@ -23,12 +22,12 @@ LAYERS = [
 TREES = {path: ast.parse(path.read_text(encoding="utf-8")) for path in sorted(ROOT.rglob("*.py"))}
 
 
-def module_of(path: Path) -> str:
+def module_of(path):
     parts = path.relative_to(ROOT.parent).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-def layer_of(module: str) -> str | None:
+def layer_of(module):
     parts = module.split(".")
     return parts[1] if len(parts) > 1 else None
 
@@ -36,7 +35,7 @@ def layer_of(module: str) -> str | None:
 MODULES = {module_of(path) for path in TREES}
 
 
-def imported(path: Path, tree: ast.AST) -> set[str]:
+def imported(path, tree):
     """Modules of armid that a file imports, wherever in the file; names of submodules are followed."""
     found = set()
     for node in ast.walk(tree):
@@ -63,9 +62,9 @@ def test_imports_go_one_way():
 
 
 def test_no_circle_of_files():
-    done: set[str] = set()
+    done = set()
 
-    def visit(module: str, path: tuple[str, ...]) -> None:
+    def visit(module, path):
         assert module not in path, f"circle: {' -> '.join((*path, module))}"
         if module not in done:
             for other in sorted(GRAPH.get(module, ())):
@@ -105,7 +104,7 @@ print([name for name in ("pymoo", "pandas", "matplotlib", "seaborn") if name in 
 
 
 def test_importing_is_light():
-    done = subprocess.run([sys.executable, "-c", LIGHT], capture_output=True, text=True, check=True)
+    done = python("-c", LIGHT)
     assert done.stdout.splitlines()[-2:] == ["[]", "[]"]
 
 

@@ -8,7 +8,6 @@ import re
 import runpy
 import shlex
 import subprocess
-import sys
 import tomllib
 from itertools import pairwise
 from pathlib import Path
@@ -19,6 +18,7 @@ from pandas import read_csv
 import armid
 from armid.cli.main import app, main
 from armid.record import read_campaign
+from commands import python
 
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 IMAGE = re.compile(r"!\[[^\]]*\]\(([^)]+)\)")
@@ -135,7 +135,7 @@ def test_the_commands_run_and_git_ignores_what_they_write(blocks, root, elsewher
 @pytest.mark.slow
 def test_the_python_examples_run(blocks, elsewhere):
     for text in blocks_of(blocks, "python"):
-        ran = subprocess.run([sys.executable, "-W", "error", "-c", text], check=False, capture_output=True, text=True)
+        ran = python("-W", "error", "-c", text)
         assert ran.returncode == 0, ran.stderr
     assert re.match(r"\{'p0': .*'n': ", ran.stdout)
 
@@ -223,7 +223,8 @@ def test_every_snippet_runs_and_every_output_is_true(page, root, elsewhere, caps
     for language, text in FENCE.findall((root / os.environ.get("ARMID_TOUR", page)).read_text(encoding="utf-8")):
         named = re.match(r"# (\S+)\n", text)
         if language == "python" and not named:
-            done = subprocess.run([sys.executable, "-c", text], check=True, capture_output=True, text=True)
+            done = python("-c", text)
+            assert done.returncode == 0, done.stderr
             printed = done.stdout
         elif language == "toml" and not named:
             assert tomllib.loads(text), "lines to put into a file"
@@ -303,13 +304,12 @@ def test_figures_behind_advice_are_those_of_the_results(root):
 @pytest.mark.slow
 def test_the_site_builds_strictly(root, tmp_path):
     pytest.importorskip("mkdocstrings", reason="mkdocs is not installed: pip install -e '.[docs]'")
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-q", "-f", root / "studies/guide/mkdocs.yml"]
-    env = {**os.environ, "NO_MKDOCS_2_WARNING": "1"}
-    done = subprocess.run([*command, "-d", tmp_path / "site"], check=False, capture_output=True, text=True, env=env)
+    words = ("build", "--strict", "-q", "-f", root / "studies/guide/mkdocs.yml", "-d", tmp_path / "site")
+    done = python("-m", "mkdocs", *words, env={**os.environ, "NO_MKDOCS_2_WARNING": "1"})
     assert (done.returncode, done.stderr) == (0, "")
-    keys, commands, python = ((tmp_path / "site/reference" / name / "index.html").read_text(encoding="utf-8")
+    keys, commands, names = ((tmp_path / "site/reference" / name / "index.html").read_text(encoding="utf-8")
                               for name in ("keys", "commands", "python"))  # fmt: skip
     assert all(f"<code>{name}</code>" in keys for name in ("windows_s", "restart_s", "supply_V", "rivals"))
     assert all(f"armid {' '.join(name)}" in commands for name in (("close-loop",), ("export", "ioh"), ("schema",)))
-    assert all(name in python for name in armid.HOME)
+    assert all(name in names for name in armid.HOME)
     assert len(list((tmp_path / "site/results").rglob("*.png"))) >= 15

@@ -16,6 +16,7 @@ from armid.model.plants.driven_axis import driven_axis
 from armid.problem.fitness import Fitness
 from armid.registry import Registry, load_plugin, load_registry
 from armid.study.spec import study_registry
+from commands import refusing
 
 LEVEL = (Parameter("c", "effort", 0.0, 0.5, null=0.0),)
 OWN = """\
@@ -137,9 +138,8 @@ def test_a_name_that_is_ours_or_that_of_another_plug_in_is_refused(own, attribut
 def test_a_file_that_fails_is_refused(tmp_path, text, fragment):
     (tmp_path / "failing.py").write_text(text)
     for _ in range(2):
-        with pytest.raises(ArmidError) as refusal:
+        with refusing(fragment):
             load_plugin(f"{tmp_path / 'failing.py'}:thing")
-        assert fragment in str(refusal.value)
     assert "armid_plugin_failing" not in sys.modules
 
 
@@ -161,7 +161,5 @@ def test_entry_points_of_installed_packages(installed):
 ])  # fmt: skip
 def test_a_bad_entry_point_is_refused(installed, point, fragments):
     installed(point)
-    with pytest.raises(ArmidError) as refusal:
+    with refusing(*fragments):
         load_registry()
-    for fragment in fragments:
-        assert fragment in str(refusal.value)

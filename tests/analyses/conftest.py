@@ -1,12 +1,10 @@
 """Made-up results of studies as fixtures."""
 
-from collections.abc import Callable
-
 import pytest
-from made_results import MadeResults, make
+from made_results import make
 
 
 @pytest.fixture(scope="session")
-def made() -> Callable[..., MadeResults]:
+def made():
     """Return the function that makes up results."""
     return make

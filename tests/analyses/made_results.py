@@ -1,6 +1,5 @@
 """Made-up results of studies, drawn by a seeded generator: they test statistics and layout, and claim nothing."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any
@@ -28,21 +27,21 @@ class MadeResults:
     study: dict[str, Any]
     kept: list[RunTrace] = field(default_factory=list)
 
-    def iter_traces(self) -> Iterator[RunTrace]:
+    def iter_traces(self):
         yield from self.kept
 
-    def text_of(self, digest: str) -> str:
+    def text_of(self, digest):
         return f"equations of {digest}"
 
 
-PAPER_CASES: list[dict[str, Any]] = [
+PAPER_CASES = [
     {"name": f"row {i + 1}", "truth": {p: TRUE[p][i] for p in UNITS}, "published": {p: FOUND[p][i] for p in UNITS}}
     for i in range(5)
 ]
 LOW, HIGH = np.array([BOX[p] for p in UNITS]).T
 
 
-def one_trace(run: str, truth: np.ndarray, end: np.ndarray, used: int, rng: np.random.Generator) -> RunTrace:
+def one_trace(run, truth, end, used, rng):
     """Return improvements that start all over the box and end where the run ended."""
     evaluations = np.unique(np.concatenate(([1], rng.integers(2, used, 25), [used - 3]))).astype(np.int64)
     share = np.linspace(0.0, 1.0, evaluations.size) ** 0.3
@@ -52,10 +51,10 @@ def one_trace(run: str, truth: np.ndarray, end: np.ndarray, used: int, rng: np.r
 
 
 def make(
-    cases: list[dict[str, Any]] = PAPER_CASES, identifiers: dict[str, float] | None = None,
-    noises: tuple[float, ...] = (0.0, 0.3), seeds: int = 5, fitness: tuple[str, ...] = ("similarity",),
-    windows: tuple[str, ...] = ("0-0.7 s",), failed: int = 0, budget: int = 3000, report: str = "",
-) -> MadeResults:  # fmt: skip
+    cases=PAPER_CASES, identifiers=None,
+    noises=(0.0, 0.3), seeds=5, fitness=("similarity",),
+    windows=("0-0.7 s",), failed=0, budget=3000, report="",
+):  # fmt: skip
     """Make up results; identifiers: label -> median error; failed: how many runs at the end fail."""
     rng = np.random.default_rng(1)
     identifiers = identifiers or {"pso": 3e-3, "cmaes": 1e-4, "de+bobyqa": 1e-6}

@@ -2,8 +2,6 @@
 
 import os
 import re
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,6 +18,7 @@ from armid.errors import ArmidError
 from armid.registry import load_registry
 from armid.report.files import markdown, write_files
 from armid.study.document import ANALYSES, own_sections, parts_of, report_of
+from commands import python
 
 
 def written(results, folder):
@@ -78,13 +77,14 @@ def test_the_page_has_every_file_table_and_figure_and_tells_what_it_is_made_of(t
 def test_same_results_give_the_same_bytes_in_another_process_and_order(table1_report, tmp_path):
     """Neither hash seeds nor the order in which two runners have finished the runs enter."""
     code = (
-        "import sys; sys.path.insert(0, sys.argv[1]); import test_study_document as test, made_results\n"
+        "import sys; sys.path[:0] = sys.argv[1:3]; import test_study_document as test, made_results\n"
         "results = test.small(made_results.make)\n"
         "mixed = test.replace(results, runs=results.runs.sample(frac=1.0, random_state=3), kept=results.kept[::-1])\n"
-        "test.written(mixed, test.Path(sys.argv[2]))"
+        "test.written(mixed, test.Path(sys.argv[3]))"
     )
-    command = [sys.executable, "-c", code, str(Path(__file__).parent), str(tmp_path / "out")]
-    subprocess.run(command, check=True, env=os.environ | {"PYTHONHASHSEED": "7"})
+    folders = (Path(__file__).parent, Path(__file__).parents[1], tmp_path / "out")
+    done = python("-c", code, *folders, env=os.environ | {"PYTHONHASHSEED": "7"})
+    assert done.returncode == 0, done.stderr
     folder, names = table1_report
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == sorted(names)
     for name in names:

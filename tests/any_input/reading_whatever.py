@@ -5,7 +5,6 @@ import os
 import tempfile
 import warnings
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from hypothesis import settings
@@ -41,8 +40,7 @@ u = "drive_V"
 """
 TIMES = np.arange(-10, 90) / 1000
 SPEEDS = 0.1 * np.sin(40 * TIMES)
-ARM_CSV = "time_s,angular_velocity_deg_s\n" + "".join(
-    f"{t:.3f},{v:.4f}\n" for t, v in zip(TIMES, SPEEDS, strict=True))  # fmt: skip
+ARM_CSV = "time_s,angular_velocity_deg_s\n" + "".join(f"{t:.3f},{v:.4f}\n" for t, v in zip(TIMES, SPEEDS, strict=True))
 AXIS_CSV = "time_s,angular_velocity_rad_s,drive_V,angle_deg\n" + "".join(
     f"{t:.3f},{v:.4f},{v:.2f},{v:.5f}\n" for t, v in zip(TIMES, SPEEDS, strict=True))  # fmt: skip
 PIECES = ("nan", "inf", "-inf", "1e308", "-1e308", "5e-324", "1e29", "-0", "0", "", ",", "\n", "\n\n", "\r", "\0", '"',
@@ -127,13 +125,13 @@ VALUES = st.recursive(
 )  # fmt: skip
 
 
-def places(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+def places(value, path=()):
     keys = list(value) if isinstance(value, dict) else range(len(value)) if isinstance(value, list) else []
     return [p for key in keys for p in ((*path, key), *places(value[key], (*path, key)))]
 
 
 @st.composite
-def mutated(draw: st.DrawFn, table: dict[str, Any]) -> dict[str, Any]:
+def mutated(draw, table):
     """Return a table with up to three parts replaced, taken out, put in under another key, or there twice."""
     changed = json.loads(json.dumps(table))
     for _ in range(draw(st.integers(1, 3))):
@@ -148,7 +146,7 @@ def mutated(draw: st.DrawFn, table: dict[str, Any]) -> dict[str, Any]:
     return changed
 
 
-def change(draw: st.DrawFn, holder: Any, key: Any) -> None:
+def change(draw, holder, key):
     what = draw(st.sampled_from(["replace", "replace", "out", "in", "twice"]))
     if what == "replace":
         holder[key] = draw(VALUES)

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 from hypothesis import example, given
 from hypothesis import strategies as st
-from pymoo.core.algorithm import Algorithm
 from pymoo.optimize import minimize
 from reading_whatever import (
     ARM_CSV,
@@ -30,7 +29,7 @@ from armid.identifiers import IDENTIFIERS, identifier_of
 from armid.model import PLANTS, Model
 from armid.problem.meter import Meter, MeterTermination
 from armid.problem.space import space_of
-from armid.study.tasks import Study, read_study
+from armid.study.tasks import read_study
 from input_texts import toml_of
 
 ARM, AXIS = tomllib.loads(ARM_TOML), tomllib.loads(AXIS_TOML)
@@ -108,7 +107,7 @@ DECLARED_ARM = Model(PLANTS["shell_transfer_arm"])
 @example("de", [("variant", "a/b")])
 @example("pso", [("", "\n")])
 def test_any_option(name, options):
-    def built() -> Algorithm:
+    def built():
         given = assignments([f"{option}={text}" for option, text in options], "--option")
         told = {option: value_of(text) for option, text in given.items()}
         return identifier_of(name, IDENTIFIERS).with_options(told).build(BUDGET)
@@ -153,7 +152,7 @@ STUDY = (FROZEN / "study.toml").read_text(encoding="utf-8")
 TABLE = tomllib.loads(STUDY)
 
 
-def study_of(content: bytes) -> bool:
+def study_of(content):
     """Read a study of these bytes beside campaigns; tell whether it was one."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
@@ -162,7 +161,7 @@ def study_of(content: bytes) -> bool:
         return outcome(lambda: checked(folder / "study.toml")) is not None
 
 
-def checked(file: Path) -> Study:
+def checked(file):
     study = read_study(file)
     assert study.description()["name"] == study.name
     assert next(iter(study.plan())).run

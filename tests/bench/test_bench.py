@@ -26,7 +26,7 @@ ROWS = [
 STAND_IN = (sys.executable, "-c", "import sys; assert sys.argv[1] == 'simulate' and sys.argv[3] == '--out'")
 
 
-def test_the_table_prints_every_row_and_says_in_words_what_falls_short() -> None:
+def test_the_table_prints_every_row_and_says_in_words_what_falls_short():
     lines = bench_table(ROWS).splitlines()
     for row, line in zip(ROWS, lines[2:], strict=False):
         assert line.startswith(row.what)
@@ -43,15 +43,15 @@ def test_the_table_prints_every_row_and_says_in_words_what_falls_short() -> None
     assert "All 1 ratios that have a bound are within it." in bench_table(ROWS[:2])
 
 
-def test_works_run_in_turn_and_the_shortest_time_counts() -> None:
-    calls: list[str] = []
+def test_works_run_in_turn_and_the_shortest_time_counts():
+    calls = []
     ticks = count()
     best = fastest({n: lambda n=n: calls.append(n) for n in "ab"}, 3, lambda: float(next(ticks)), slot=0.0)
     assert calls == list("ab" * 4)
     assert best == {"a": 1.0, "b": 1.0}
 
 
-def test_quick_has_the_same_parts_with_options_that_they_take_and_a_run_measures_every_part(monkeypatch) -> None:
+def test_quick_has_the_same_parts_with_options_that_they_take_and_a_run_measures_every_part(monkeypatch):
     quick = bench.bench_parts(quick=True)
     assert list(quick) == list(bench.bench_parts())
     for part in quick.values():
@@ -60,7 +60,7 @@ def test_quick_has_the_same_parts_with_options_that_they_take_and_a_run_measures
     assert bench.run_bench() == ROWS[:3]
 
 
-def assert_measured(row: Row) -> None:
+def assert_measured(row):
     numbers = [row.measured, row.ratio, row.simulations_per_s]
     assert all(n is None or (np.isfinite(n) and n > 0) for n in numbers)
     assert row.measured is not None
@@ -68,12 +68,11 @@ def assert_measured(row: Row) -> None:
 
 
 @pytest.mark.slow
-def test_engine_scipy_and_plain_loop_are_measured_with_their_errors() -> None:
+def test_engine_scipy_and_plain_loop_are_measured_with_their_errors():
     engine, scipy, plain = rows = engine_rows(rounds=1, n_candidates=16, n_scipy=2)
     for row in rows:
         assert_measured(row)
         assert row.simulations_per_s == pytest.approx(1e6 / row.measured)
-        assert row.error is not None
     assert engine.ratio is None
     assert max(engine.error, scipy.error) <= ALLOWED
     assert plain.error <= 2e-3
@@ -81,14 +80,14 @@ def test_engine_scipy_and_plain_loop_are_measured_with_their_errors() -> None:
 
 
 @pytest.mark.slow
-def test_effects_are_measured_on_candidates_that_reach_their_switch() -> None:
+def test_effects_are_measured_on_candidates_that_reach_their_switch():
     row = effects_row(rounds=1, n_candidates=16)
     assert_measured(row)
     assert row.error <= ALLOWED
     assert "16 of 16 candidates reach their switch" in row.note
 
 
-def test_threads_give_the_same_bits_and_fitnesses_and_the_framework_are_measured_apart() -> None:
+def test_threads_give_the_same_bits_and_fitnesses_and_the_framework_are_measured_apart():
     row = threads_row(rounds=1, n_candidates=32, attempts=1)
     assert_measured(row)
     assert row.error <= ALLOWED
@@ -100,7 +99,7 @@ def test_threads_give_the_same_bits_and_fitnesses_and_the_framework_are_measured
     assert all(word in whole.note for word in ("simulation", "fitness", "framework"))
 
 
-def test_memory_rows_compare_ten_times_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_memory_rows_compare_ten_times_the_work(monkeypatch):
     monkeypatch.setattr(processes, "measured_apart", lambda n, s: n * s)
     candidates, samples = memory_rows(10, 100)
     for row in (candidates, samples):
@@ -125,7 +124,7 @@ def test_start_up_calls_the_command_and_says_why_it_failed(tmp_path, monkeypatch
 
 
 @pytest.mark.slow
-def test_large_campaigns_are_identified_in_memory_that_is_told() -> None:
+def test_large_campaigns_are_identified_in_memory_that_is_told():
     long, many = scale_rows(20_000, 10)
     assert (long.what, many.what) == ("identify, 20,000 samples", "identify, 10 records")
     for row in (long, many):

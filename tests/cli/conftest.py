@@ -1,11 +1,5 @@
 """A small campaign, files that plug-ins are read from, and commands in processes of their own."""
 
-import os
-import subprocess
-import sys
-from collections.abc import Callable
-from pathlib import Path
-
 import pytest
 
 PLUGINS = '''\
@@ -78,7 +72,7 @@ def no_algorithm(budget):
 
 
 @pytest.fixture(scope="session")
-def small_folder(paper_arm_folder: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def small_folder(paper_arm_folder, tmp_path_factory):
     """The committed campaign with one lowering to train on and one to hold out: two records are drawn, not seven."""
     folder = tmp_path_factory.mktemp("small")
     head, *records = (paper_arm_folder / "campaign.toml").read_text(encoding="utf-8").split("[[records]]")
@@ -90,24 +84,13 @@ def small_folder(paper_arm_folder: Path, tmp_path_factory: pytest.TempPathFactor
 
 
 @pytest.fixture(scope="session")
-def mine(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def mine(tmp_path_factory):
     file = tmp_path_factory.mktemp("plugins") / "mine.py"
     file.write_text(PLUGINS, encoding="utf-8")
     return file
 
 
-@pytest.fixture(scope="session")
-def other_process(root: Path) -> Callable[..., "subprocess.CompletedProcess[str]"]:
-    """Return a function that runs a command in a process of its own."""
-
-    def ran(*arguments: object, **options: object) -> "subprocess.CompletedProcess[str]":
-        command = [sys.executable, "-m", "armid", *map(str, arguments)]
-        return subprocess.run(command, check=False, capture_output=True, text=True, cwd=root, env=os.environ, **options)
-
-    return ran
-
-
 @pytest.fixture
-def in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def in_a_folder(tmp_path, monkeypatch):
     """Commands write into a working folder of their own."""
     monkeypatch.chdir(tmp_path)

@@ -8,6 +8,8 @@ import sys
 
 import pytest
 
+from commands import remount
+
 LOOP = ("--candidates", "viscous", "--threads", "1")
 
 
@@ -37,7 +39,7 @@ def test_a_page_for_a_read_only_folder(run, refused, synthetic_axis, disk):
     folder = disk("20m")
     assert run("identify", *commands(synthetic_axis, folder / "out")["identify"]).code == 0
     before = {p.name: p.read_bytes() for p in (folder / "out").iterdir()}
-    subprocess.run(["mount", "-o", "remount,ro", str(folder)], check=True)
+    remount(folder, "ro")
     assert "Read-only file system" in refused("report", folder / "out")
     assert {p.name: p.read_bytes() for p in (folder / "out").iterdir()} == before
 

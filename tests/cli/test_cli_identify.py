@@ -8,6 +8,8 @@ from shutil import copytree
 import numpy as np
 import pytest
 
+from commands import python
+
 QUICK = ("--budget", "160", "--window", "0:0.4", "--identifier", "pso", "--fitness", "similarity")
 USED = r"^(\d+) of (\d+) simulations used, (.*); seed (\d+)\.$"
 
@@ -38,7 +40,7 @@ def test_prints_tables_and_remarks_in_units_that_people_read(run, paper_arm_fold
     assert max(len(line) for line in ran.out.splitlines() if "│" in line) <= 80
 
 
-def test_writes_result_and_figures_the_same_bits_in_another_process(identified, other_process, small_folder, tmp_path):
+def test_writes_result_and_figures_the_same_bits_in_another_process(identified, small_folder, tmp_path):
     text, result = identified("--seed", "7")
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
         "convergence.png", "convergence.svg", "details.json", "fit.png", "pairs.png", "pairs.svg", "report.html",
@@ -50,7 +52,7 @@ def test_writes_result_and_figures_the_same_bits_in_another_process(identified, 
     assert result["campaign"] == "paper_arm"
     # its TOML stands for the folder
     campaign = small_folder / "campaign.toml"
-    again = other_process("identify", campaign, *QUICK, "--seed", 7, "--out", tmp_path / "again")
+    again = python("-m", "armid", "identify", campaign, *QUICK, "--seed", 7, "--out", tmp_path / "again")
     # no bar without a terminal
     assert (again.returncode, again.stderr) == (0, "")
     assert "\x1b" not in again.stdout

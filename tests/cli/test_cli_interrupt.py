@@ -13,6 +13,7 @@ import pytest
 from armid.estimation.identify import identify
 from armid.identifiers import IDENTIFIERS
 from armid.problem.fitness import FITNESS
+from commands import python
 
 pty = pytest.importorskip("pty")
 
@@ -123,10 +124,10 @@ run()
 @pytest.mark.usefixtures("keyboard")
 def test_an_interrupt_within_generated_code_is_one_and_a_request_to_end_in_the_first_moments(tmp_path):
     (tmp_path / "within.py").write_text(WITHIN)
-    ran = subprocess.run([sys.executable, "-m", "within"], cwd=tmp_path, capture_output=True, text=True, check=False)
+    ran = python("-m", "within", cwd=tmp_path)
     assert (ran.returncode, ran.stdout, ran.stderr) == (130, "", "armid: interrupted\n")
     # While the command is being imported.
-    ran = subprocess.run([sys.executable, "-c", ASKED], capture_output=True, text=True, check=False)
+    ran = python("-c", ASKED)
     assert (ran.returncode, ran.stdout, ran.stderr) == (130, "", "armid: interrupted\n")
 
 
@@ -144,7 +145,7 @@ finally:
 
 @pytest.mark.parametrize("word", ["INT", "TERM"])
 def test_a_signal_after_the_work_changes_no_exit_code(word):
-    ran = subprocess.run([sys.executable, "-c", LATE.format(word)], capture_output=True, text=True, check=False)
+    ran = python("-c", LATE.format(word))
     assert (ran.returncode, ran.stderr) == (0, "")
     assert "driven_axis" in ran.stdout
 

@@ -7,6 +7,7 @@ from warnings import catch_warnings, simplefilter
 import numpy as np
 import pytest
 
+import synthetic
 from armid import read_campaign
 from armid.record.table import read_table
 
@@ -14,18 +15,13 @@ pytestmark = pytest.mark.usefixtures("in_a_folder")
 N, INTERVAL = 2000, 0.004
 
 
-def wheel(seed, gain=30.0, damping=2.0):
+def wheel(seed):
     """Return times [s], voltage, speed [rad/s] and angle [rad] of a motor with a wheel; the first second is rest."""
     rng = np.random.default_rng(seed)
     times = INTERVAL * np.arange(N)
     drive = np.where(times < 1.0, 0.0, np.repeat(rng.uniform(-6.0, 6.0, N // 100), 100))
-    speed, angle = np.zeros(N), np.zeros(N)
-    for i in range(N - 1):
-        kept = np.exp(-damping * INTERVAL)
-        speed[i + 1] = kept * speed[i] + gain / damping * (1.0 - kept) * drive[i]
-        angle[i + 1] = angle[i] + 0.5 * INTERVAL * (speed[i] + speed[i + 1])
-    noise = 0.05 * rng.standard_normal(N)
-    return times, drive, speed + noise, angle
+    speed, angle = synthetic.wheel(drive, INTERVAL, 30.0, 2.0)
+    return times, drive, speed + 0.05 * rng.standard_normal(N), angle
 
 
 def spreadsheet(seed):

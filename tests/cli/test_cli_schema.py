@@ -12,6 +12,7 @@ import pytest
 from armid import ArmidError, read_campaign, read_study
 from armid.record.schema import CampaignSheet, Known, Override, RecordSheet
 from armid.study.spec import CaseSpec, EntrySpec, LoopSpec, ManoeuvreSpec, RandomCasesSpec, StudySpec, SuiteSpec
+from commands import python
 from input_texts import toml_of
 
 SHEETS = (CampaignSheet, RecordSheet, Override, Known, StudySpec, LoopSpec, CaseSpec, EntrySpec, ManoeuvreSpec,
@@ -32,8 +33,8 @@ WRONG = [
 
 
 @pytest.fixture(scope="module")
-def schemas(other_process):
-    return {what: json.loads(other_process("schema", what).stdout) for what in ("campaign", "study")}
+def schemas():
+    return {what: json.loads(python("-m", "armid", "schema", what).stdout) for what in ("campaign", "study")}
 
 
 def kind_of(file):

@@ -2,10 +2,7 @@
 
 import json
 import os
-import subprocess
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,6 +14,7 @@ from armid.contract.trials import simulate_plainly
 from armid.identifiers import IDENTIFIERS, identifier_of
 from armid.model import EFFECTS, PLANTS, Effect, Guard, Manoeuvre, Model, Parameter, State, applicable
 from armid.problem.fitness import FITNESS
+from commands import python
 
 ARM = PLANTS["shell_transfer_arm"]
 AXIS = replace(PLANTS["driven_axis"].for_unit("m/s"), variants=())
@@ -84,17 +82,14 @@ print(json.dumps(found))
 """
 
 
-def logs(hash_seed: str) -> dict[str, str]:
+def logs(hash_seed):
     """Fingerprint of each identifier's log, from a process of its own."""
-    paths = [str(Path(__file__).parents[2] / "src"), os.environ.get("PYTHONPATH", "")]
-    told = os.environ | {"PYTHONHASHSEED": hash_seed, "PYTHONPATH": os.pathsep.join(p for p in paths if p)}
-    told_to = [sys.executable, "-c", SCRIPT, *NAMES]
-    done = subprocess.run(told_to, env=told, stdout=subprocess.PIPE, text=True, check=True)
-    return dict(json.loads(done.stdout.splitlines()[-1]))
+    done = python("-c", SCRIPT, *NAMES, env=os.environ | {"PYTHONHASHSEED": hash_seed})
+    return json.loads(done.stdout.splitlines()[-1])
 
 
 @pytest.mark.slow
-def test_two_processes_ask_for_the_same() -> None:
+def test_two_processes_ask_for_the_same():
     first, second = logs("1"), logs("2")
     assert set(first) == set(NAMES)
     # bipop_cmaes is cmaes until its first restart, which this budget does not reach.
@@ -107,7 +102,7 @@ TIMES = 0.01 * np.arange(151)
 
 
 @pytest.mark.parametrize("number", [0, 1, 6])
-def test_agrees_with_reference_trajectories(number: int) -> None:
+def test_agrees_with_reference_trajectories(number):
     row = index_rows()[number]
     expected = np.loadtxt(REFERENCE / row["file"], delimiter=",", skiprows=1)[:801:4, 2]
     found = simulate_plainly(Model(PLANTS["shell_transfer_arm"]), manoeuvre_of(row, 0.004, 201), candidate_of(row))[0]
@@ -117,7 +112,7 @@ def test_agrees_with_reference_trajectories(number: int) -> None:
 COASTING = Manoeuvre(0.01, 151, {"start_speed": 0.9}, {"u": np.zeros(151)})
 
 
-def test_switches_once_between_samples_lands_on_kinks_and_carries_added_states() -> None:
+def test_switches_once_between_samples_lands_on_kinks_and_carries_added_states():
     late = Effect("late", (Parameter("level", "effort", 0, 9, null=0.0),), {"torque": lambda on, level: -level * on},
                   guards=(Guard("on", lambda time: 0.503 - time, latch=True),))  # fmt: skip
     found = simulate_plainly(Model(PLANTS["driven_axis"]) + late, COASTING, np.array([3.0, 6.0]))[0]

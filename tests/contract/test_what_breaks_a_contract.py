@@ -1,12 +1,10 @@
 """Each point of a contract is missed by something: here is what misses it."""
 
 import random
-from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import replace
 from threading import Thread
 from time import sleep
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +13,6 @@ from pymoo.algorithms.soo.nonconvex.pattern import PatternSearch
 
 from armid.contract.check import check_fitness, check_identifier
 from armid.contract.equations import check_effect, check_effects, check_plant
-from armid.contract.trials import ContractPoint
 from armid.identifiers import as_identifier
 from armid.model import PLANTS, Effect, Guard, Parameter, State
 from armid.problem.fitness import Fitness
@@ -29,14 +26,14 @@ def drag(omega, level):
     return -level * omega
 
 
-def failed(points: Iterable[ContractPoint]) -> dict[str, str]:
+def failed(points):
     """Name -> sentence of the points that do not hold, without the plant's name."""
     findings = list(points)
     assert all(f.sentence and "\n" not in f.sentence for f in findings)
     return {f.name.split(" on driven")[0].split(", driven")[0]: f.sentence for f in findings if not f.passed}
 
 
-def effect(function: Callable[..., Any] = drag, *parameters: Parameter, name: str = "own", **more: Any) -> Effect:
+def effect(function=drag, *parameters, name="own", **more):
     return Effect(name, parameters or (LEVEL,), {"torque": function}, **more)
 
 
@@ -66,7 +63,7 @@ DECLARED = {
 
 
 @pytest.mark.slow
-def test_effects_miss_points_beside_others_that_keep_them() -> None:
+def test_effects_miss_points_beside_others_that_keep_them():
     named = {f"own_{i}": pair for i, pair in enumerate((*BESIDE.items(), ("", drag)))}
     with np.errstate(all="ignore"):
         found = list(check_effects([effect(function, name=name) for name, (_, function) in named.items()], AXIS))
@@ -76,19 +73,19 @@ def test_effects_miss_points_beside_others_that_keep_them() -> None:
 
 
 @pytest.mark.slow
-def test_an_effect_that_does_not_vanish_at_null_is_found() -> None:
+def test_an_effect_that_does_not_vanish_at_null_is_found():
     shaped = effect(lambda omega, level, width: -level * omega + (0.001 if width > 0.9 else 0.0), LEVEL,
                     Parameter("width", "1", 0.0, 1.0))  # fmt: skip
     assert "null law" in failed(check_effect(shaped, AXIS))
 
 
 @pytest.mark.parametrize(("point", "given"), DECLARED.items())
-def test_an_effect_misses_a_point_of_its_declaration(point: str, given: Effect) -> None:
+def test_an_effect_misses_a_point_of_its_declaration(point, given):
     assert point in failed(check_effect(given, {} if point != "binds" else AXIS))
     assert point != "binds" or "altitude" in failed(check_effect(given, AXIS))["binds"]
 
 
-def test_silence_is_said_and_is_no_fault_and_what_does_not_compile_is_found() -> None:
+def test_silence_is_said_and_is_no_fault_and_what_does_not_compile_is_found():
     silent = effect(lambda omega, level: -level * omega, states=(State("x", "1", drag, lambda: 0.0),))
     said = next(f for f in check_effect(silent, {}) if f.name == "documented")
     assert said.passed
@@ -97,7 +94,7 @@ def test_silence_is_said_and_is_no_fault_and_what_does_not_compile_is_found() ->
 
 
 @pytest.mark.slow
-def test_a_plant_misses_points() -> None:
+def test_a_plant_misses_points():
     axis = AXIS["driven_axis"]
     broken = replace(
         axis,
@@ -112,7 +109,7 @@ def test_a_plant_misses_points() -> None:
 @pytest.mark.parametrize(("point", "drive"), [
     ("binds", lambda gain, voltage: gain), ("finite", lambda gain, u, v: gain * u + 1e5 * v**3),
 ])  # fmt: skip
-def test_a_plant_that_does_not_bind_or_runs_away_is_told_so(point: str, drive: Callable[..., Any]) -> None:
+def test_a_plant_that_does_not_bind_or_runs_away_is_told_so(point, drive):
     axis = AXIS["driven_axis"]
     assert point in failed(check_plant(replace(axis, quantities={**axis.quantities, "drive_effort": drive})))
 
@@ -138,45 +135,45 @@ FITNESS_BROKEN = {
 
 
 @pytest.mark.parametrize(("point", "function"), FITNESS_BROKEN.items())
-def test_a_fitness_misses_a_point(point: str, function: Callable[..., Any]) -> None:
+def test_a_fitness_misses_a_point(point, function):
     assert point in failed(check_fitness(Fitness("own", function)))
 
 
-class Beginning(DE):  # type: ignore[misc]
+class Beginning(DE):
     """Differential evolution whose first candidate comes from elsewhere."""
 
-    def __init__(self, first: Callable[[Any], Any]) -> None:
+    def __init__(self, first):
         super().__init__()
         self.first = first
 
-    def _initialize_infill(self) -> Any:
+    def _initialize_infill(self):
         found = super()._initialize_infill()
         found[0].X = self.first(self.problem)
         return found
 
 
-class Swallowing(DE):  # type: ignore[misc]
+class Swallowing(DE):
     """Differential evolution that takes an error of the problem for an end."""
 
-    def next(self) -> None:
+    def next(self):
         with suppress(Exception):
             return super().next()
         self.termination.terminate()
         self.termination.update(self)
 
 
-class Leaving(DE):  # type: ignore[misc]
+class Leaving(DE):
     """Differential evolution that leaves a thread behind."""
 
-    def _setup(self, problem: Any, **options: Any) -> None:
+    def _setup(self, problem, **options):
         super()._setup(problem, **options)
         Thread(target=sleep, args=(1.0,), daemon=True).start()
 
 
-class Poisoned(DE):  # type: ignore[misc]
+class Poisoned(DE):
     """Differential evolution that stops at the first NaN."""
 
-    def _initialize_advance(self, infills: Any = None, **options: Any) -> None:
+    def _initialize_advance(self, infills=None, **options):
         super()._initialize_advance(infills, **options)
         if np.isnan(infills.get("F")).any():
             self.termination.terminate()
@@ -185,11 +182,11 @@ class Poisoned(DE):  # type: ignore[misc]
 @pytest.mark.parametrize(("kind", "point"), [
     (Swallowing, "errors come out"), (Leaving, "errors come out"), (Poisoned, "survives NaN"),
 ])  # fmt: skip
-def test_an_identifier_misses_one_point(kind: type[DE], point: str) -> None:
+def test_an_identifier_misses_one_point(kind, point):
     assert set(failed(check_identifier(as_identifier("own", kind)))) == {point}
 
 
-def test_an_identifier_misses_points() -> None:
+def test_an_identifier_misses_points():
     random.seed(5)
     state = random.getstate()
     assert set(failed(check_identifier(as_identifier("own", DE)))) == set()

@@ -3,7 +3,6 @@
 from importlib import import_module
 
 import numpy as np
-from numpy.typing import NDArray
 
 from arm_cases import box_of
 from armid.engine import Schedule, calibrate, probes, simulate
@@ -11,7 +10,7 @@ from armid.inference.library import quickly_calibrated
 from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
 
 
-def test_probes_fill_the_box_and_what_cannot_be_reached_is_said(arm: Model) -> None:
+def test_probes_fill_the_box_and_what_cannot_be_reached_is_said(arm):
     low, high = box_of(arm)
     spread = (probes(low, high, 200) - low) / (high - low)
     assert spread.shape == (200, 4)
@@ -44,7 +43,7 @@ def test_a_finer_accuracy_takes_more_steps_errors_are_honest_and_a_long_record_i
     assert whole.error <= parts.error <= 3.0 * whole.error
 
 
-def test_long_steps_are_taken_where_candidates_could_try_them(arm: Model, manoeuvres: dict[str, Manoeuvre]) -> None:
+def test_long_steps_are_taken_where_candidates_could_try_them(arm, manoeuvres):
     spread = probes(*box_of(arm))
     for name in ("lower", "raise_empty"):
         found = calibrate(arm, manoeuvres[name], spread, "fine")
@@ -59,7 +58,7 @@ def test_long_steps_are_taken_where_candidates_could_try_them(arm: Model, manoeu
 RUBBED = Model(PLANTS["driven_axis"], (EFFECTS["coulomb"], EFFECTS["viscous"]))
 
 
-def rubbing() -> tuple[Manoeuvre, NDArray[np.float64]]:
+def rubbing():
     """Return a motion that turns back often, in friction whose sign changes between two samples, and 20 candidates."""
     times = 0.01 * np.arange(400)
     drive = 2.0 * np.sin(2.0 * times) + 1.5 * np.sin(7.3 * times)
@@ -69,7 +68,7 @@ def rubbing() -> tuple[Manoeuvre, NDArray[np.float64]]:
     return Manoeuvre(0.01, 400, {}, {"u": drive}), values * spread
 
 
-def test_only_rough_samples_are_cut() -> None:
+def test_only_rough_samples_are_cut():
     manoeuvre, candidates = rubbing()
     finest = simulate(RUBBED, manoeuvre, candidates, Schedule(64)).output
     ranges = np.ptp(finest, axis=1).max() * np.ones(len(RUBBED.states))
@@ -89,7 +88,7 @@ def test_only_rough_samples_are_cut() -> None:
     assert np.array_equal(np.array(alone), simulate(RUBBED, manoeuvre, candidates, schedule, threads=2).output)
 
 
-def test_the_loop_spares_steps_where_friction_asks_for_many_and_what_is_cut_changes_smoothly() -> None:
+def test_the_loop_spares_steps_where_friction_asks_for_many_and_what_is_cut_changes_smoothly():
     manoeuvre, candidates = rubbing()
     found = quickly_calibrated(RUBBED, manoeuvre, candidates[:8])
     assert found.reached

@@ -36,25 +36,25 @@ print(json.dumps({"hits": hits, "misses": misses, "last": found.output[0, -1]}))
 """
 
 
-def start(folder: Path) -> subprocess.Popen[str]:
+def start(folder):
     """Simulate in a process of its own, with a cache folder."""
     paths = [str(Path(__file__).parents[2] / "src"), os.environ.get("PYTHONPATH", "")]
     told = os.environ | {"ARMID_CACHE": str(folder), "PYTHONPATH": os.pathsep.join(p for p in paths if p)}
     return subprocess.Popen([sys.executable, "-W", "error", "-c", SCRIPT], env=told, text=True, stdout=subprocess.PIPE)
 
 
-def result(process: subprocess.Popen[str]) -> dict[str, float]:
+def result(process):
     out, _ = process.communicate(timeout=300)
     assert process.returncode == 0
     return dict(json.loads(out))
 
 
-def listing(folder: Path) -> dict[str, tuple[int, int]]:
+def listing(folder):
     return {str(p): (p.stat().st_size, p.stat().st_mtime_ns) for p in folder.rglob("*") if p.is_file()}
 
 
 @pytest.mark.slow
-def test_a_second_process_compiles_nothing_and_damaged_code_is_compiled_again(tmp_path: Path) -> None:
+def test_a_second_process_compiles_nothing_and_damaged_code_is_compiled_again(tmp_path):
     """No other number, no traceback, whatever became of the files; and they are mended."""
     folder = tmp_path / "new" / "cache"
     both = [start(folder), start(folder)]
@@ -74,16 +74,16 @@ def test_a_second_process_compiles_nothing_and_damaged_code_is_compiled_again(tm
     assert mended["last"] == then["last"] == again["last"]
 
 
-def effect_of(folder: Path, text: str) -> Effect:
+def effect_of(folder, text):
     """An effect whose equation is read from a file of that text."""
-    names: dict[str, object] = {}
+    names = {}
     file = folder / f"user_{abs(hash(text))}.py"
     file.write_text(text, encoding="utf-8")
     exec(compile(text, str(file), "exec"), names)
-    return Effect("own", (Parameter("level", "effort", 0, 1, null=0.0),), {"torque": names["torque"]})  # type: ignore[dict-item]
+    return Effect("own", (Parameter("level", "effort", 0, 1, null=0.0),), {"torque": names["torque"]})
 
 
-def test_a_module_is_named_by_its_equations(tmp_path: Path) -> None:
+def test_a_module_is_named_by_its_equations(tmp_path):
     """By what they compute and what they take from their file, not by the words beside them."""
     head = "def torque(omega, level):\n    return -level * "
     texts = [
@@ -98,7 +98,7 @@ def test_a_module_is_named_by_its_equations(tmp_path: Path) -> None:
     assert names[0] != module_name(kernel_parts(models[0], 4))
 
 
-def test_a_cache_that_cannot_be_written_is_done_without(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch):
     (tmp_path / "a file").write_text("")
     monkeypatch.setenv("ARMID_CACHE", str(tmp_path / "a file" / "cache"))
     parts = kernel_parts(Model(PLANTS["driven_axis"]), 2)
@@ -107,13 +107,13 @@ def test_a_cache_that_cannot_be_written_is_done_without(tmp_path: Path, monkeypa
         assert load_module(parts).simulate
 
 
-def damaged(content: bytes) -> list[bytes]:
+def damaged(content):
     flipped = bytearray(content)
     flipped[len(content) // 2] ^= 4
     return [b"", content[: len(content) // 2], bytes(len(content)), bytes(flipped), b"raise SystemExit"]
 
 
-def test_ctrl_c_that_numba_loses_ends_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_that_numba_loses_ends_all_the_same(tmp_path, monkeypatch):
     """An interrupt while LLVM hands over the machine code ends in its callback, and numba is left without the code."""
     monkeypatch.setenv("ARMID_CACHE", str(tmp_path))
     monkeypatch.setattr(codegen.CodeLibrary, "_compiled_object", property(lambda _: None, lambda *_: None), False)
@@ -122,7 +122,7 @@ def test_ctrl_c_that_numba_loses_ends_all_the_same(tmp_path: Path, monkeypatch: 
     assert not list(cache_folder().iterdir())
 
 
-def test_a_damaged_module_is_written_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_damaged_module_is_written_again(tmp_path, monkeypatch):
     monkeypatch.setenv("ARMID_CACHE", str(tmp_path))
     parts = kernel_parts(Model(PLANTS["driven_axis"]), 2)
     name = module_name(parts)
@@ -145,10 +145,10 @@ def test_code_that_another_user_may_have_written_is_not_run(tmp_path, monkeypatc
     elsewhere.mkdir()
     write_whole(elsewhere / path.name, b"code")
 
-    def link() -> None:
+    def link():
         path.symlink_to(elsewhere / path.name)
 
-    def open_to_others() -> None:
+    def open_to_others():
         os.link(elsewhere / path.name, path)
         path.chmod(0o620)
 
@@ -167,7 +167,7 @@ def test_code_that_another_user_may_have_written_is_not_run(tmp_path, monkeypatc
     assert path.exists()
 
 
-def test_where_the_cache_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_the_cache_is(tmp_path, monkeypatch):
     monkeypatch.setenv("ARMID_CACHE", str(tmp_path))
     assert cache_folder() == tmp_path / f"armid-{os.getuid()}"
     monkeypatch.delenv("ARMID_CACHE")
@@ -189,7 +189,7 @@ def test_where_the_cache_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     assert unusable(tmp_path) == "it is somebody else's"
 
 
-def test_models_run_in_packed_instructions(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_models_run_in_packed_instructions(monkeypatch):
     features = llvm.get_host_cpu_features()
     if not (features.get("avx2") or features.get("avx512f")):
         pytest.skip("this processor has neither AVX2 nor AVX-512, whose instructions are looked for")
@@ -224,8 +224,8 @@ def test_a_linked_function_has_no_code_of_its_own_and_what_is_shared_or_rare_sta
     assert ["noinline" in text for text in texts[:2]] == [False, True]
 
 
-def test_one_of_two_threads_that_wait_for_the_same_kernel_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    said: list[str] = []
+def test_one_of_two_threads_that_wait_for_the_same_kernel_says_so(monkeypatch):
+    said = []
     monkeypatch.setattr(compiler, "announced", lambda sentence: nullcontext(said.append(sentence)))
     model, kernel = Model(PLANTS["rotary_arm"]), SimpleNamespace(signatures=[])
     with compiler.compiling(model, kernel), compiler.compiling(model, kernel):

@@ -5,27 +5,24 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from armid.contract.trials import simulate_plainly
-from armid.engine import Schedule, Simulation, calibrate, simulate
+from armid.engine import Schedule, calibrate, simulate
 from armid.errors import ArmidError
 from armid.model import EFFECTS, PLANTS, Input, Manoeuvre, Model, Parameter, Plant, Scales, State
 
-Array = NDArray[np.float64]
 INTERVAL, N_SAMPLES = 0.01, 201
 TIMES = INTERVAL * np.arange(N_SAMPLES)
 MASS = 3.0
 
 
 @pytest.fixture(scope="module")
-def axis() -> Model:
+def axis():
     """Mass, then level and width of Coulomb friction, slope of viscous friction, constant effort."""
     return Model(PLANTS["driven_axis"]) + EFFECTS["coulomb"] + EFFECTS["viscous"] + EFFECTS["torque_offset"]
 
 
-def move(axis: Model, drive: Array, level: float = 0.0, slope: float = 0.0, offset: float = 0.0, substeps: int = 4,
-         hold: str = "linear", **constants: float) -> Simulation:  # fmt: skip
+def move(axis, drive, level=0.0, slope=0.0, offset=0.0, substeps=4, hold="linear", **constants):
     """Move the mass; constants by name."""
     manoeuvre = Manoeuvre(INTERVAL, len(drive), constants, {"u": drive}, hold)
     return simulate(axis, manoeuvre, [MASS, level, 0.005, slope, offset], Schedule(substeps), states=True)
@@ -51,12 +48,12 @@ CLOSED_FORMS = {
 
 
 @pytest.mark.parametrize("case", CLOSED_FORMS)
-def test_the_speed_is_that_of_the_closed_form(axis: Model, case: str) -> None:
+def test_the_speed_is_that_of_the_closed_form(axis, case):
     drive, options, expected, relative, absolute = CLOSED_FORMS[case]
     np.testing.assert_allclose(move(axis, drive, **options).output[0], expected, rtol=relative, atol=absolute)
 
 
-def test_coulomb_friction_stops_the_mass_for_good_and_a_pendulum_swings_as_its_small_angle_says(axis: Model) -> None:
+def test_coulomb_friction_stops_the_mass_for_good_and_a_pendulum_swings_as_its_small_angle_says(axis):
     """From v0 the mass slows down by level / m and stands from m v0 / level on, but for the smoothing."""
     level, start = 4.0, 0.9
     found = move(axis, np.zeros(N_SAMPLES), level=level, substeps=32, start_speed=start)
@@ -72,7 +69,7 @@ def test_coulomb_friction_stops_the_mass_for_good_and_a_pendulum_swings_as_its_s
 
 
 @pytest.mark.parametrize("hold", ["linear", "zero"])
-def test_halving_steps_divides_the_error_by_sixteen(axis: Model, hold: str) -> None:
+def test_halving_steps_divides_the_error_by_sixteen(axis, hold):
     """Fourth order, whatever the drive does at its samples."""
     drive = np.sign(np.sin(9.0 * TIMES))
     runs = [move(axis, drive, slope=30.0, gravity_moment=200.0, substeps=n, hold=hold) for n in (2, 4, 8)]
@@ -80,7 +77,7 @@ def test_halving_steps_divides_the_error_by_sixteen(axis: Model, hold: str) -> N
     assert 12.0 <= coarse / fine <= 20.0
 
 
-def test_a_mass_too_light_for_the_steps_gets_finer_ones(axis: Model) -> None:
+def test_a_mass_too_light_for_the_steps_gets_finer_ones(axis):
     """With coarse steps friction of 2 N s/m throws a mass of 2 g about: such a schedule must not be taken."""
     manoeuvre = Manoeuvre(INTERVAL, N_SAMPLES, {}, {"u": np.sin(9.0 * TIMES)})
     candidates = np.array([[0.002, 0.0, 0.005, 2.0, 0.0], [3.0, 0.0, 0.005, 2.0, 0.0]])

@@ -1,12 +1,10 @@
 """The arm against what shares no code with the engine: reference trajectories, and scipy on the stand's equations."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
-from arm_cases import REFERENCE, Array, box_of, candidate_of, drawn, index_rows
-from armid.engine import Schedule, Simulation, calibrate, probes, simulate
+from arm_cases import REFERENCE, box_of, candidate_of, drawn, index_rows
+from armid.engine import Schedule, calibrate, probes, simulate
 from armid.model import EFFECTS, Manoeuvre, Model, applicable, refusal_of
 from stand import RefusalError
 from stand.arm import KNOWN, Arm
@@ -14,7 +12,6 @@ from stand.effects import Effects
 from stand.motion import Motion
 from stand.motion import simulate as simulate_on_stand
 
-ScheduleFor = Callable[[str, str], Schedule]
 ERROR = {"standard": 1e-5, "fine": 2e-7}
 # After the current has changed its sign, this file is off by 7e-7 rad/s: there the test stand and the engine with very
 # fine steps, which share no code, agree with each other within 2e-10.
@@ -22,7 +19,7 @@ ROUGH = {"trajectory_05.csv": 7e-7}
 N_CANDIDATES, SEED = 56, 20261121
 
 
-def stand_speed(manoeuvre: str, candidate: Array, **effects: float) -> tuple[Array, float | None] | None:
+def stand_speed(manoeuvre, candidate, **effects):
     """Speed at 1 kHz over 1.2 s, (1201,), and the time of the switch; None where the arm would leave its travel."""
     try:
         found = simulate_on_stand(Motion(Arm(*map(float, candidate)), KNOWN[manoeuvre], Effects(**effects)), 1.2)
@@ -31,10 +28,9 @@ def stand_speed(manoeuvre: str, candidate: Array, **effects: float) -> tuple[Arr
     return np.asarray(found.gyro), found.switch_s
 
 
-def check(found: Simulation, stood: list[tuple[Array, float | None] | None], allowed: float) -> None:
+def check(found, stood, allowed):
     """Compare speeds at every sample, and switch times."""
     for i, one in enumerate(stood):
-        assert one is not None
         speed, switch = one
         assert np.abs(found.output[i] - speed).max() <= allowed
         switched = found.switch_times["closed"][i]
@@ -57,7 +53,7 @@ def test_agrees_with_the_reference_and_the_test_stand(row, arm, manoeuvres, sche
     check(simulate(arm, manoeuvre, candidate, Schedule(48)), [stood], 1e-9)
 
 
-def test_what_is_integrated_in_place_of_powers_and_cosines_stays_equal_to_them(arm: Model) -> None:
+def test_what_is_integrated_in_place_of_powers_and_cosines_stays_equal_to_them(arm):
     """p (V/V0)^n stays p0 and sine^2 + cosine^2 stays 1 over a long motion."""
     states = simulate(arm, Manoeuvre(0.001, 4001), drawn(arm, 30, 2), Schedule(2), states=True).states
     assert np.abs(states["sine"] ** 2 + states["cosine"] ** 2 - 1.0).max() <= 1e-9
@@ -151,7 +147,7 @@ THIRD_ON_STAND = {
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("k", "planted"), [(0, ON_STAND), (1, SECOND_ON_STAND), (2, THIRD_ON_STAND)])
-def test_effects_move_the_arm_as_on_the_test_stand(k, planted, arm: Model, manoeuvres: dict[str, Manoeuvre]) -> None:
+def test_effects_move_the_arm_as_on_the_test_stand(k, planted, arm, manoeuvres):
     """All effects, or all further forms, in one model that tests/contract compiles: one at its null adds nothing."""
     forms = [e.every_form[k] for e in applicable(EFFECTS, arm.plant).values() if k < len(e.every_form)]
     model = Model(arm.plant, tuple(form for form in forms if not refusal_of(form, arm.plant)))
@@ -163,7 +159,6 @@ def test_effects_move_the_arm_as_on_the_test_stand(k, planted, arm: Model, manoe
         declared, *signals = simulate(model, manoeuvres[stroke], population, Schedule(16)).output
         for (name, (_, on_stand, near)), signal in zip(planted.items(), signals, strict=True):
             stood = stand_speed(stroke, population[0, :4], **on_stand)
-            assert stood is not None
             missed, without = (np.abs(found - stood[0]).max() for found in (signal, declared))
             assert missed <= near, (stroke, name)
             assert without > max(5e-3, 2.0 * missed), (stroke, name)

@@ -35,7 +35,7 @@ class Case(NamedTuple):
     tolerance: float = 0.0
 
 
-def spread(low: float = 1e-300, high: float = 1e300, sign: bool = True) -> Array:
+def spread(low=1e-300, high=1e300, sign=True):
     """Values over many decades, both signs, with the corners."""
     random = np.random.default_rng(7)
     decades = 10.0 ** random.uniform(np.log10(low), np.log10(high), 400)
@@ -44,33 +44,33 @@ def spread(low: float = 1e-300, high: float = 1e300, sign: bool = True) -> Array
     return np.concatenate([values, -values, CORNERS] if sign else [values, np.abs(CORNERS)])
 
 
-def pairs(values: Array) -> Array:
+def pairs(values):
     """Each value with another, and all pairs of corners."""
     other = np.random.default_rng(8).permutation(values)
     a, b = np.meshgrid(CORNERS, CORNERS)
     return np.array([np.concatenate([values, a.ravel()]), np.concatenate([other, b.ravel()])])
 
 
-def single(values: Array) -> Array:
+def single(values):
     return np.array([values, values])
 
 
-def without(inputs: Array, *conditions: Callable[[Array, Array], NDArray[np.bool_]]) -> Array:
+def without(inputs, *conditions):
     for condition in conditions:
         inputs = inputs[:, ~condition(*inputs)]
     return inputs
 
 
-def both_infinite(x: Array, y: Array) -> NDArray[np.bool_]:
+def both_infinite(x, y):
     return np.asarray(np.isinf(x) & np.isinf(y))
 
 
-def square_leaves_range(x: Array, y: Array) -> NDArray[np.bool_]:
+def square_leaves_range(x, y):
     """The length of two lanes is the root of squares: those must neither overflow nor vanish."""
     return np.asarray(np.logical_or.reduce([(np.abs(v) > 1e150) | ((np.abs(v) < 1e-150) & (v != 0.0)) for v in (x, y)]))
 
 
-def subnormal(*values: Array) -> NDArray[np.bool_]:
+def subnormal(*values):
     return np.asarray(np.logical_or.reduce([(np.abs(v) < 2.3e-308) & (v != 0.0) for v in values]))
 
 
@@ -130,13 +130,13 @@ ALL = [*CASES, *ANGLE_CASES]
 
 
 @pytest.fixture(scope="module")
-def results() -> dict[str, Array]:
+def results():
     """What lanes make of every case; one compilation for all of them."""
     lines = [f"store(out, {k} * n + i, splat(0.0) + 1.0 * ({c.text}))" for k, c in enumerate(ALL)]
     loads = [f"x, y = load(given, {2 * k} * n + i), load(given, {2 * k + 1} * n + i)" for k in range(len(ALL))]
     body = "\n".join(f"        {load}\n        {line}" for load, line in zip(loads, lines))
     text = f"def apply(given, n, out):\n    for i in range(0, n, {WIDTH}):\n{body}\n"
-    names: dict[str, Any] = {"np": np, "math": math, "load": load, "store": store, "splat": splat}
+    names = {"np": np, "math": math, "load": load, "store": store, "splat": splat}
     exec(text, names)
     n = -(-max(c.inputs.shape[1] for c in ALL) // WIDTH) * WIDTH
     given = np.ones((len(ALL), 2, n))
@@ -147,14 +147,14 @@ def results() -> dict[str, Array]:
     return {c.text: out[k, : c.inputs.shape[1]] for k, c in enumerate(ALL)}
 
 
-def expected_of(case: Case) -> Array:
+def expected_of(case):
     with np.errstate(all="ignore"):
         wants_one = isinstance(case.expected, np.ufunc) and case.expected.nin == 1
         return np.asarray(case.expected(*case.inputs[: 1 if wants_one else 2]), dtype=float)
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda c: c.text)
-def test_agrees_with_numpy(case: Case, results: dict[str, Array]) -> None:
+def test_agrees_with_numpy(case, results):
     found, expected = results[case.text], expected_of(case)
     expected = np.where(subnormal(expected), 0.0, expected) if case.tolerance else expected
     same = (found == expected) | (np.isnan(found) & np.isnan(expected))
@@ -165,13 +165,13 @@ def test_agrees_with_numpy(case: Case, results: dict[str, Array]) -> None:
 
 
 @pytest.mark.parametrize("case", ANGLE_CASES, ids=lambda c: c.text)
-def test_sine_and_cosine_agree_with_numpy(case: Case, results: dict[str, Array]) -> None:
+def test_sine_and_cosine_agree_with_numpy(case, results):
     found, expected = results[case.text], expected_of(case)
     assert np.array_equal(np.isnan(found), np.isnan(expected))
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=4 * EPS)
 
 
-def test_every_function_of_lanes_has_a_case() -> None:
+def test_every_function_of_lanes_has_a_case():
     spelt = {operator.pow: "**", operator.and_: "&", operator.or_: "|", operator.invert: "~", operator.neg: "-x",
              operator.pos: "+x"}  # fmt: skip
     for function in lane_numpy.LANE_FUNCTIONS:

@@ -1,16 +1,15 @@
 """What `simulate` takes, refuses and returns; no candidate depends on who is simulated beside it or on threads."""
 
 import tracemalloc
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pytest
 
-from arm_cases import Array, drawn
+from arm_cases import drawn
 from armid.contract.trials import PlainModel
-from armid.engine import Schedule, Simulation, along, simulate
+from armid.engine import Schedule, along, simulate
 from armid.engine.generate import FEWEST_IDLE, strengths_of
 from armid.errors import ArmidError
 from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
@@ -21,7 +20,7 @@ AXIS = Model(PLANTS["driven_axis"])
 TRUTH = np.array([3.05e6, 1.0, 0.55, 1.4])
 
 
-def test_shapes_and_that_a_switch_that_is_never_reached_has_no_time(arm: Model) -> None:
+def test_shapes_and_that_a_switch_that_is_never_reached_has_no_time(arm):
     found = simulate(arm, Manoeuvre(0.001, 60), drawn(arm, 11, 1), states=True)
     assert found.output.shape == (11, 60)
     assert found.failed.shape == found.switch_times["closed"].shape == (11,)
@@ -40,13 +39,13 @@ def test_shapes_and_that_a_switch_that_is_never_reached_has_no_time(arm: Model) 
 
 
 @pytest.mark.parametrize("plan", [None, np.full(899, 4)], ids=["no plan", "a plan of another length"])
-def test_more_samples_do_not_change_the_first(arm: Model, plan: Array | None) -> None:
+def test_more_samples_do_not_change_the_first(arm, plan):
     population = drawn(arm, 5, 3)
     short, long = (simulate(arm, Manoeuvre(0.001, n), population, Schedule(plan=plan)).output for n in (301, 900))
     assert np.array_equal(short, long[:, :301])
 
 
-def test_refused(arm: Model) -> None:
+def test_refused(arm):
     with pytest.raises(ArmidError, match=r"shape \(2, 3\) was given: \(n_candidates, 4\) is expected for p0, k, eta3"):
         simulate(arm, Manoeuvre(0.001, 60), np.ones((2, 3)))
     with pytest.raises(ArmidError, match="constant 'theta_E' is not one of plant 'shell_transfer_arm': did you mean"):
@@ -60,11 +59,11 @@ def test_refused(arm: Model) -> None:
 
 
 @pytest.fixture(scope="module")
-def schedule(schedule_for: Callable[[str, str], Schedule]) -> Schedule:
+def schedule(schedule_for):
     return schedule_for("lower", "standard")
 
 
-def same(found: Simulation, rows: Array | slice, expected: Simulation) -> bool:
+def same(found, rows, expected):
     """Compare outputs, failures and switch times bit for bit."""
     pairs = [(found.output, expected.output), (found.failed, expected.failed)]
     pairs += [(found.switch_times[k], v) for k, v in expected.switch_times.items()]
@@ -81,13 +80,12 @@ def test_neighbours_threads_and_weights_change_no_bit(arm, manoeuvres, schedule)
     for threads in (2, 3, 8, 64):
         found = simulate(arm, manoeuvres["lower"], population, schedule, threads=threads)
         assert same(whole, slice(None), found)
-    assert schedule.weights is not None
     for weights in (None, -schedule.weights, np.ones(4)):
         other = simulate(arm, manoeuvres["lower"], population, replace(schedule, weights=weights))
         assert same(whole, slice(None), other)
 
 
-def test_a_diverged_candidate_is_nan_from_then_on_and_harms_no_other(manoeuvres, arm: Model):
+def test_a_diverged_candidate_is_nan_from_then_on_and_harms_no_other(manoeuvres, arm):
     pushed_arm = arm + EFFECTS["viscous"]
     calm = np.column_stack([drawn(pushed_arm, 20, 25)[:, :4], np.zeros(20)])
     wild = np.column_stack([drawn(pushed_arm, 30, 26)[:, :4], -np.geomspace(1e3, 1e7, 30)])
@@ -106,7 +104,7 @@ def test_a_diverged_candidate_is_nan_from_then_on_and_harms_no_other(manoeuvres,
         assert np.nanmax(np.abs(found.output)) <= 1e3 * pushed_arm.plant.scales.speed
 
 
-def test_an_impossible_parameter_fails_alone(arm: Model, manoeuvres: dict[str, Manoeuvre], schedule: Schedule) -> None:
+def test_an_impossible_parameter_fails_alone(arm, manoeuvres, schedule):
     population, others = drawn(arm, 12, 27), np.arange(12) != 5
     expected = simulate(arm, manoeuvres["lower"], population, schedule)
     for value in (np.nan, np.inf, -1e300, 1e300):
@@ -118,10 +116,10 @@ def test_an_impossible_parameter_fails_alone(arm: Model, manoeuvres: dict[str, M
         assert np.array_equal(found.output[others], expected.output[others])
 
 
-def test_memory_is_flat_beyond_the_output(arm: Model) -> None:
+def test_memory_is_flat_beyond_the_output(arm):
     """What Python holds at the peak, and what tracemalloc cannot see: the compiled loop's own arrays."""
 
-    def beyond_output(n_candidates: int, n_samples: int) -> int:
+    def beyond_output(n_candidates, n_samples):
         population = drawn(arm, n_candidates, 1)
         tracemalloc.start()
         try:
@@ -162,7 +160,7 @@ N_POINTS, STEP, DISAGREEMENT = 2000, 1e-6, 1e-3
 DIRECTIONS = [[1.0, 0.7, -0.9, 0.8], *np.eye(4).tolist()]
 
 
-def central(values: Array, points: int) -> Array:
+def central(values, points):
     """Central differences over so many points to each side, at the points where the widest fit."""
     middle = slice(100, N_POINTS - 100)
     return np.asarray((np.roll(values, -points) - np.roll(values, points))[middle]) / (2 * points * STEP)
@@ -187,11 +185,11 @@ NAMES = ("coulomb", "viscous", "tilt", "gas_heat_loss", "gyro_lag", "shell_rocki
 
 
 @pytest.fixture(scope="module")
-def unweighted(schedule_for: Callable[[str, str], Schedule]) -> Schedule:
+def unweighted(schedule_for):
     return replace(schedule_for("lower", "standard"), weights=None)
 
 
-def using(wide: Model, plain: Array, name: str, share: float = 0.3) -> Array:
+def using(wide, plain, name, share=0.3):
     """Return a candidate that uses one effect, every other at its null."""
     values = dict(zip(list(wide.parameters)[: len(plain)], plain, strict=True))
     for key, p in list(wide.parameters.items())[len(plain) :]:
@@ -203,8 +201,8 @@ def using(wide: Model, plain: Array, name: str, share: float = 0.3) -> Array:
 
 @pytest.mark.slow
 def test_a_small_model_evaluates_every_effect_and_the_motion_is_that_without_what_is_inactive(
-    arm: Model, wide: Model, rubbing_arm, manoeuvres, unweighted
-) -> None:
+    arm, wide, rubbing_arm, manoeuvres, unweighted
+):
     assert len(NAMES) == FEWEST_IDLE
     least = Model(arm.plant, tuple(EFFECTS[n] for n in NAMES))
     assert not strengths_of(Model(arm.plant, least.effects[1:]))

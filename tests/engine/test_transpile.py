@@ -2,14 +2,12 @@
 
 import functools
 import random
-from collections.abc import Callable
-from typing import Any
 
 import equations_of_a_user as user
 import numpy as np
 import pytest
 
-from armid.engine import Schedule, Simulation, simulate
+from armid.engine import Schedule, simulate
 from armid.engine.transpile import SourceText
 from armid.errors import ArmidError
 from armid.model import PLANTS, Effect, Guard, Manoeuvre, Model, Parameter, Plant, Scales, State
@@ -31,12 +29,12 @@ ramp = Plant(
 )  # fmt: skip
 
 
-def name_of(function: Callable[..., Any]) -> str:
+def name_of(function):
     return f"{function.__name__.strip('<>')}_{function.__code__.co_firstlineno}"
 
 
 @pytest.fixture(scope="module")
-def found() -> Simulation:
+def found():
     """The ramp with every equation as an effect; in each candidate one of them is not at its null, one level each."""
     effects = tuple(
         Effect(f"e{i}", (Parameter("level", "1", 0.0, 1.0, null=0.0),), {"output": f}) for i, f in enumerate(ALL)
@@ -48,7 +46,7 @@ def found() -> Simulation:
 
 
 @pytest.mark.parametrize("function", ALL, ids=name_of)
-def test_computes_the_same_as_python(function: Callable[..., Any], found: Simulation) -> None:
+def test_computes_the_same_as_python(function, found):
     speeds = found.states["omega"][0]
     assert np.array_equal(speeds, -0.5 + np.arange(N_SAMPLES) / 64)
     expected = [[float(function(float(w), float(level))) for w in speeds] for level in LEVELS]
@@ -57,7 +55,7 @@ def test_computes_the_same_as_python(function: Callable[..., Any], found: Simula
     np.testing.assert_allclose(made, expected, rtol=1e-14, atol=1e-15)
 
 
-def test_runs_lane_by_lane_only_where_it_must() -> None:
+def test_runs_lane_by_lane_only_where_it_must():
     for function in ALL:
         sources = SourceText()
         sources.add("f__x", function)
@@ -80,7 +78,7 @@ def falls(h):
 
 
 @pytest.mark.slow
-def test_names_of_the_loop_numpy_and_builtins_and_an_own_clock_and_switch_can_be_used() -> None:
+def test_names_of_the_loop_numpy_and_builtins_and_an_own_clock_and_switch_can_be_used():
     states = tuple(State(n, "1", one, one) for n in NAMES)
     guards = (Guard("kink", falls), Guard("n", falls, latch=True))
     parameters = (Parameter("x", "1", 0.0, 1.0, null=0.0), Parameter("time_of", "1", 0.0, 1.0))
@@ -110,7 +108,7 @@ def of_constants(gain, gravity_moment):
     return low + (10.0 if gravity_moment == 0.0 and gain > 0 else 20.0) + max(gain, gravity_moment, 1.5)
 
 
-def test_selections_work_on_plain_numbers_too() -> None:
+def test_selections_work_on_plain_numbers_too():
     push = Effect("push", (Parameter("unused", "1", 0.0, 1.0, null=0.0),), {"torque": of_constants})
     rest = Manoeuvre(0.01, 11, {"gain": 2.0}, {"u": np.zeros(11)})
     found = simulate(Model(PLANTS["driven_axis"]) + push, rest, [[1.0, 0.0]])
@@ -161,7 +159,7 @@ class Owner:
         return -omega * level
 
 
-typed: dict[str, Any] = {}
+typed = {}
 exec("def typed_in(omega, level): return -omega * level", typed)
 
 TOLD = {
@@ -185,7 +183,7 @@ COMPILED = {
 }  # fmt: skip
 
 
-def refused(function: Callable[..., Any], sentence: str) -> ArmidError:
+def refused(function, sentence):
     bad = Effect("bad", (Parameter("level", "effort", 0, 1, null=0.0),), {"torque": function})
     with pytest.raises(ArmidError, match=sentence) as caught:
         simulate(Model(PLANTS["driven_axis"]) + bad, MANOEUVRE, [[1.0, 0.1]])
@@ -194,11 +192,11 @@ def refused(function: Callable[..., Any], sentence: str) -> ArmidError:
 
 
 @pytest.mark.parametrize(("function", "sentence"), TOLD.values(), ids=TOLD)
-def test_what_cannot_be_written_down(function: Callable[..., Any], sentence: str) -> None:
+def test_what_cannot_be_written_down(function, sentence):
     refused(function, sentence)
 
 
 @pytest.mark.parametrize(("function", "sentence"), COMPILED.values(), ids=COMPILED)
-def test_what_numba_cannot_compile(function: Callable[..., Any], sentence: str) -> None:
+def test_what_numba_cannot_compile(function, sentence):
     error = refused(function, sentence)
     assert error.__cause__ is not None, "the cause must not be lost"

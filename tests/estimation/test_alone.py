@@ -1,14 +1,12 @@
 """A search run without pymoo's loop is the search that pymoo's loop runs: the same candidates, ends and errors."""
 
-from typing import Any
-
 import numpy as np
 import pytest
 from pymoo.optimize import minimize
 from pymoo.util.display.single import SingleObjectiveOutput
 
 from armid.estimation.identify import search
-from armid.identifiers import IDENTIFIERS, Identifier, PaperPSO, SearchAlgorithm, identifier_of, run
+from armid.identifiers import IDENTIFIERS, PaperPSO, SearchAlgorithm, identifier_of, run
 from armid.problem.fitness import FITNESS
 from armid.problem.meter import Meter, MeterTermination
 from armid.problem.problem import IdentificationProblem
@@ -20,26 +18,26 @@ BUDGET = 150
 
 
 @pytest.fixture
-def posed(arm_space, lowering_replays) -> Any:
+def posed(arm_space, lowering_replays):
     """Make the problem afresh: a meter and what it counts for."""
 
-    def make(budget: int = BUDGET, target: float | None = None) -> tuple[IdentificationProblem, Meter]:
+    def make(budget=BUDGET, target=None):
         meter = Meter(budget, target)
         return IdentificationProblem(arm_space, lowering_replays, FITNESS["rmse"], meter), meter
 
     return make
 
 
-def by_pymoo(problem: IdentificationProblem, meter: Meter, identifier: Identifier, seed: int) -> list[int]:
+def by_pymoo(problem, meter, identifier, seed):
     """Run it as any user of pymoo would; return what was used after each generation."""
-    used: list[int] = []
+    used = []
     told = {"seed": seed, "callback": lambda _: used.append(meter.used), "copy_algorithm": False}
     minimize(problem, identifier.build(meter.budget), MeterTermination(meter), **told)
     return used
 
 
 @pytest.mark.parametrize("name", [*OWN, *COMPOSED])
-def test_the_log_is_that_of_minimize(posed, name) -> None:
+def test_the_log_is_that_of_minimize(posed, name):
     (problem, meter), (other, theirs), used = posed(), posed(), []
     identifier = identifier_of(name, IDENTIFIERS)
     search(problem, meter, identifier, 3, lambda m: used.append(m.used))
@@ -50,12 +48,12 @@ def test_the_log_is_that_of_minimize(posed, name) -> None:
 
 
 @pytest.mark.parametrize("name", ALONE)
-def test_an_error_of_the_problem_comes_out(posed, monkeypatch, name) -> None:
+def test_an_error_of_the_problem_comes_out(posed, monkeypatch, name):
     for error in (ZeroDivisionError("mine"), KeyboardInterrupt(), StopIteration()):
         problem, meter = posed()
         answered, left, after = problem.answered, [1 if name.startswith(("random", "sobol", "pso")) else 4], [0]
 
-        def failing(X: Any, residuals: bool = False, *, error=error, answered=answered, left=left, after=after) -> Any:
+        def failing(X, residuals=False, *, error=error, answered=answered, left=left, after=after):
             left[0] -= 1
             if left[0] < 0:
                 after[0] += 1
@@ -69,7 +67,7 @@ def test_an_error_of_the_problem_comes_out(posed, monkeypatch, name) -> None:
         assert after == [1]
 
 
-def test_it_ends_at_the_target_where_minimize_does_and_shows_what_pymoo_does(posed) -> None:
+def test_it_ends_at_the_target_where_minimize_does_and_shows_what_pymoo_does(posed):
     for identifier in (identifier_of(name, IDENTIFIERS) for name in ALONE):
         _, first = whole = posed()
         by_pymoo(*whole, identifier, 1)

@@ -115,7 +115,6 @@ def test_draws_from_a_fitted_start_scatter_less_where_the_start_takes_up_noise(w
     space = space_of(axis_model, bounds={"mass": (1.0, 40.0), "viscous.slope": (0.1, 30.0)})
     ready = with_fitted_starts(replays(campaign.train, axis_model, space), space)
     correction = ready[0].pieces[0].correction
-    assert correction is not None
     x = np.array([10.0, 15.0])
     task = Task(SQUARES, ready, space, x, information_at(ready, space, x))
     noise = np.random.default_rng(3).standard_normal((4, 401))

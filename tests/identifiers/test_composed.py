@@ -1,26 +1,22 @@
 """Chains, multistart and CMA-ES with restarts: who gets how many simulations, and where each phase starts."""
 
 import random
-from typing import Any
 
 import numpy as np
 import pytest
 from pymoo.algorithms.soo.nonconvex.cmaes import CMAES
 from pymoo.algorithms.soo.nonconvex.de import DE
 from pymoo.algorithms.soo.nonconvex.nelder import NelderMead
-from pymoo.core.algorithm import Algorithm
 from pymoo.optimize import minimize
 from searches import Bowl, asked_of, identifier, ran
 
-from armid.estimation.identify import identify
 from armid.identifiers import IDENTIFIERS, as_identifier, identifier_of
 from armid.identifiers.catalogue import spread
-from armid.model import Model
 from armid.problem.fitness import FITNESS
 from armid.problem.meter import Meter, MeterTermination
 from armid.problem.problem import IdentificationProblem, replays
 from armid.problem.space import space_of
-from armid.record import Campaign, read_campaign
+from armid.record import read_campaign
 
 OWN = IDENTIFIERS | {
     "mine": as_identifier("mine", NelderMead), "evolution": as_identifier("evolution", lambda budget: DE(pop_size=10)),
@@ -29,7 +25,7 @@ OWN = IDENTIFIERS | {
 
 
 @pytest.mark.parametrize(("share", "end"), [(None, 100), (0.3, 60), ("0.3", 60), ([0.3], 60), (0.005, 1)])
-def test_the_first_phase_gets_its_share_exactly_and_the_second_starts_at_its_best(share: Any, end: int) -> None:
+def test_the_first_phase_gets_its_share_exactly_and_the_second_starts_at_its_best(share, end):
     problem, alone = Bowl(), Bowl()
     options = {} if share is None else {"share": share}
     ran("random+bobyqa", problem, 200, **options, **{"random.n_candidates": 16})
@@ -44,7 +40,7 @@ def test_the_first_phase_gets_its_share_exactly_and_the_second_starts_at_its_bes
     assert f.min() < f[:end].min()
 
 
-def test_three_phases_the_budget_that_an_early_end_leaves_and_a_swarm_with_the_inertia_of_its_share() -> None:
+def test_three_phases_the_budget_that_an_early_end_leaves_and_a_swarm_with_the_inertia_of_its_share():
     problem = Bowl()
     ran("random+bobyqa+nelder_mead", problem, 400, share="0.1:0.2", **{"random.n_candidates": 40})
     sizes = [len(batch) for batch in problem.batches]
@@ -62,7 +58,7 @@ def test_three_phases_the_budget_that_an_early_end_leaves_and_a_swarm_with_the_i
     np.testing.assert_array_equal(asked_of(problem)[0][:64], asked_of(alone)[0])
 
 
-def test_capabilities_of_the_composed_are_those_of_their_parts_and_options_reach_these() -> None:
+def test_capabilities_of_the_composed_are_those_of_their_parts_and_options_reach_these():
     chain = identifier("random+multistart:least_squares+lbfgs")
     assert (chain.is_global, chain.uses_gradient, chain.is_stochastic, chain.needs_residuals) == (True,) * 4
     local = identifier("bobyqa+nelder_mead")
@@ -78,9 +74,9 @@ def test_capabilities_of_the_composed_are_those_of_their_parts_and_options_reach
 
 @pytest.mark.parametrize("name", ["evolution+bobyqa", "evolution+mine", "pso+mine+bobyqa", "multistart:mine",
                                   "evolution+adapted"])  # fmt: skip
-def test_a_user_s_own_takes_part(name: str) -> None:
+def test_a_user_s_own_takes_part(name):
     problem = Bowl()
-    algorithm: Algorithm = identifier_of(name, OWN).build(400)
+    algorithm = identifier_of(name, OWN).build(400)
     result = minimize(problem, algorithm, ("n_eval", 400), seed=1, copy_algorithm=False)
     asked, f = asked_of(problem)
     assert result.F[0] == f.min() < 1.0
@@ -89,13 +85,13 @@ def test_a_user_s_own_takes_part(name: str) -> None:
         np.testing.assert_allclose(asked[200], asked[np.argmin(f[:200])], rtol=1e-12)
 
 
-def jumps(problem: Bowl) -> int:
+def jumps(problem):
     """How often a search moved by more than a third of the box in one step."""
     steps = np.diff(problem.unit(np.array([batch[0] for batch in problem.batches])), axis=0)
     return int((np.abs(steps).max(axis=1) > 1.0 / 3.0).sum())
 
 
-def test_starts_fill_the_box_evenly() -> None:
+def test_starts_fill_the_box_evenly():
     points = spread(np.random.default_rng(1), 4)
     first = np.array([next(points) for _ in range(64)])
     assert ((first >= 0.0) & (first < 1.0)).all()
@@ -104,7 +100,7 @@ def test_starts_fill_the_box_evenly() -> None:
         assert np.histogram(column, 4, (0.0, 1.0))[0].min() >= 13
 
 
-def test_cma_es_starts_again_with_twice_the_population() -> None:
+def test_cma_es_starts_again_with_twice_the_population():
     problem = Bowl()
     result = ran("cmaes", problem, 3000, n_candidates=8)
     sizes = [len(batch) for batch in problem.batches]
@@ -121,7 +117,7 @@ def test_cma_es_is_silent_and_draws_from_nobody_else(name, tmp_path, monkeypatch
     monkeypatch.chdir(tmp_path)
     random.seed(5)
     np.random.seed(5)
-    before = random.getstate(), np.random.get_state()[1].copy()  # type: ignore[union-attr,index]
+    before = random.getstate(), np.random.get_state()[1].copy()
     runs = []
     for _ in range(2):
         problem = Bowl()
@@ -131,7 +127,7 @@ def test_cma_es_is_silent_and_draws_from_nobody_else(name, tmp_path, monkeypatch
     assert list(tmp_path.iterdir()) == []
     assert capfd.readouterr() == ("", "")
     assert random.getstate() == before[0]
-    np.testing.assert_array_equal(np.random.get_state()[1], before[1])  # type: ignore[index]
+    np.testing.assert_array_equal(np.random.get_state()[1], before[1])
 
 
 # The paper's Table I.
@@ -146,7 +142,7 @@ CLEAN = ("--noise-deg-s", "0", "--quantisation-deg-s", "0", "--repeats", "1", "-
 @pytest.mark.slow
 @pytest.mark.parametrize("truth", ROWS.values(), ids=ROWS)
 @pytest.mark.parametrize("name", ["least_squares", "pso+least_squares"])
-def test_all_four_within_a_millionth_of_the_truth(stand, arm: Model, truth: tuple[float, ...], name: str) -> None:
+def test_all_four_within_a_millionth_of_the_truth(stand, arm, truth, name):
     told = [word for name, value in zip(("p0", "k", "eta3", "n"), truth) for word in (f"--{name}", repr(value))]
     campaign = read_campaign(stand(*CLEAN, *told))
     space = space_of(arm)
@@ -157,14 +153,3 @@ def test_all_four_within_a_millionth_of_the_truth(stand, arm: Model, truth: tupl
         minimize(problem, identifier(name).build(3000), MeterTermination(meter), seed=seed, copy_algorithm=False)
         assert np.abs(meter.best_x / truth - 1.0).max() < 1e-6
         assert meter.used < 3000
-
-
-def test_one_run_from_a_chain(lowering: Campaign, arm: Model, arm_space) -> None:
-    found = identify(lowering, arm, arm_space, FITNESS["likelihood"], identifier("pso+least_squares"), 400, seed=3)
-    assert found.identifier == "pso+least_squares"
-    assert 200 < found.used < 400
-    assert found.stopped == "pso+least_squares stopped by itself"
-    alone = identify(lowering, arm, arm_space, FITNESS["likelihood"], identifier("least_squares"), 400, seed=4)
-    assert alone.used < 100
-    assert found.value == pytest.approx(alone.value, rel=1e-9)
-    np.testing.assert_allclose(found.candidate, alone.candidate, rtol=1e-5)

@@ -5,23 +5,21 @@ from contextlib import suppress
 import nlopt
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from searches import Bowl, identifier, ran
 
 from armid.identifiers.local import ALGORITHMS, CENTRAL, NO_PROGRESS, slopes, stencil
 from armid.identifiers.search import Calls
 
-Array = NDArray[np.float64]
 FREE = ("nelder_mead", "bobyqa", "sbplx", "cobyla")
 # A seed whose start is in the middle of the box, where no step has to turn.
 INNER = 6
 
 
-def nlopt_alone(name: str, problem: Bowl, start: Array, n: int) -> Array:
+def nlopt_alone(name, problem, start, n):
     """The points that NLopt asks for when it calls the function itself, no thread and no pymoo around it."""
-    asked: list[Array] = []
+    asked = []
 
-    def height(u: Array, gradient: Array) -> float:
+    def height(u, gradient):
         asked.append(u.copy())
         r = problem.A @ u - problem.b
         if gradient.size:
@@ -41,7 +39,7 @@ def nlopt_alone(name: str, problem: Bowl, start: Array, n: int) -> Array:
 
 
 @pytest.mark.parametrize("name", ALGORITHMS)
-def test_asks_for_what_nlopt_alone_asks_for(name: str) -> None:
+def test_asks_for_what_nlopt_alone_asks_for(name):
     problem = Bowl()
     ran(name, problem, 60)
     asked = problem.unit(np.array([batch[0] for batch in problem.batches]))
@@ -50,7 +48,7 @@ def test_asks_for_what_nlopt_alone_asks_for(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", FREE)
-def test_the_first_step_is_the_one_that_was_asked_for(name: str) -> None:
+def test_the_first_step_is_the_one_that_was_asked_for(name):
     for step in (0.05, 0.2):
         problem = Bowl()
         ran(name, problem, 2, seed=INNER, initial_step=step)
@@ -59,7 +57,7 @@ def test_the_first_step_is_the_one_that_was_asked_for(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", [*FREE, "lbfgs", "slsqp", "least_squares"])
-def test_a_start_without_fitness_is_drawn_again(name: str) -> None:
+def test_a_start_without_fitness_is_drawn_again(name):
     problem = Bowl(fail_above=0.1)
     result = ran(name, problem, 200, seed=6)
     starts = problem.unit(problem.batches[0])[0, 0], problem.unit(problem.batches[1])[0, 0]
@@ -68,7 +66,7 @@ def test_a_start_without_fitness_is_drawn_again(name: str) -> None:
     assert problem.unit(result.X)[0] <= 0.1
 
 
-def test_where_all_fails_the_budget_is_the_end_and_a_tolerance_ends_a_search_earlier() -> None:
+def test_where_all_fails_the_budget_is_the_end_and_a_tolerance_ends_a_search_earlier():
     result = ran("bobyqa", Bowl(fail_above=-1.0), 30)
     assert result.algorithm.evaluator.n_eval == 30
     assert result.X is None
@@ -77,17 +75,17 @@ def test_where_all_fails_the_budget_is_the_end_and_a_tolerance_ends_a_search_ear
     assert identifier("bobyqa", tolerance=0).build(10).budget == 10
 
 
-def quadratic(u: Array) -> Array:
+def quadratic(u):
     """Two functions of three parameters, (n, 3) -> (n, 2), and their gradient at u by hand below."""
     return np.column_stack([u[:, 0] ** 2 + 3.0 * u[:, 1] * u[:, 2], 2.0 * u[:, 0] - u[:, 2] ** 2])
 
 
-def gradient(u: Array) -> Array:
+def gradient(u):
     return np.array([[2.0 * u[0], 2.0], [3.0 * u[2], 0.0], [3.0 * u[1], -2.0 * u[2]]])
 
 
 @pytest.mark.parametrize("u", [(0.3, 0.6, 0.5), (1.0, 0.0, 0.9999), (0.0, 1.0, 5e-4)])
-def test_central_differences_are_exact_for_parabolas_also_at_bounds(u: tuple[float, ...]) -> None:
+def test_central_differences_are_exact_for_parabolas_also_at_bounds(u):
     here = np.array(u)
     points, offsets = stencil(here, 1e-3, CENTRAL)
     assert points.shape == (6, 3)
@@ -98,7 +96,7 @@ def test_central_differences_are_exact_for_parabolas_also_at_bounds(u: tuple[flo
 
 
 @pytest.mark.parametrize(("kind", "size"), [("forward", 3), ("central", 6)])
-def test_derivatives_are_one_population_and_counted(kind: str, size: int) -> None:
+def test_derivatives_are_one_population_and_counted(kind, size):
     for name in ("lbfgs", "slsqp", "least_squares"):
         problem = Bowl()
         result = ran(name, problem, 60, differences=kind)
@@ -119,15 +117,15 @@ class EnoughError(Exception):
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_an_error_of_the_objective_arrives_whatever_nlopt_makes_of_it(seed: int) -> None:
+def test_an_error_of_the_objective_arrives_whatever_nlopt_makes_of_it(seed):
     rng = np.random.default_rng(seed)
     A = rng.standard_normal((4, 4))
     A = A @ A.T * 10.0 ** rng.uniform(0, 4)
     centre, start = rng.uniform(0.2, 0.8, 4), rng.uniform(0.1, 0.9, 4)
     for enough in range(80, 145, 3):
-        called: list[int] = []
+        called = []
 
-        def value(u: Array, _: Array, enough: int = enough, called: list[int] = called) -> float:
+        def value(u, _, enough=enough, called=called):
             called.append(1)
             if len(called) > enough:
                 raise EnoughError

@@ -1,10 +1,7 @@
 """The paper's swarm: its equations, particle by particle, and what pymoo expects of it."""
 
-from typing import Any
-
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from pymoo.core.evaluator import Evaluator
 from pymoo.core.problem import Problem
 from pymoo.optimize import minimize
@@ -12,29 +9,27 @@ from pymoo.optimize import minimize
 from armid.identifiers import IDENTIFIERS, as_identifier
 from armid.identifiers.pso import PaperPSO
 
-Array = NDArray[np.float64]
 
-
-def valley(x: Array) -> Array:
+def valley(x):
     """Return the height of a narrow curved valley in four dimensions, (n, 4) -> (n,); 0 at 1, 1, 1, 1."""
     a, b, c, d = x.T
     steps = ((a, b), (b, c), (c, d))
     return np.asarray(sum(100.0 * (v - u * u) ** 2 + (1.0 - u) ** 2 for u, v in steps))
 
 
-class Valley(Problem):  # type: ignore[misc]
+class Valley(Problem):
     """The valley in [-2, 2]^4, with all that was asked."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         super().__init__(n_var=4, n_obj=1, xl=-2.0, xu=2.0)
-        self.seen: list[Array] = []
+        self.seen = []
 
-    def _evaluate(self, x: Array, out: dict[str, Any], *_: Any, **__: Any) -> None:
+    def _evaluate(self, x, out, *_, **__):
         self.seen.append(x.copy())
         out["F"] = valley(x)
 
 
-def literal_swarm(seed: int, n_particles: int, n_iterations: int, limit: Array) -> tuple[Array, Array]:
+def literal_swarm(seed, n_particles, n_iterations, limit):
     """Eqs 8-9 particle by particle in [-2, 2]^4; returns positions, (n_iterations, n_particles, 4), and the bests."""
     random = np.random.default_rng(seed)
     draw = lambda: random.random((n_particles, 4))  # noqa: E731
@@ -59,7 +54,7 @@ def literal_swarm(seed: int, n_particles: int, n_iterations: int, limit: Array) 
 
 
 @pytest.mark.parametrize(("limit", "fraction"), [("literal", 0.5), (0.1, 0.1)])
-def test_moves_as_the_equations_say(limit: str | float, fraction: float) -> None:
+def test_moves_as_the_equations_say(limit, fraction):
     problem, bests = Valley(), []
     swarm = PaperPSO(n_particles=13, n_iterations=40, velocity_limit=limit)
     minimize(problem, swarm, seed=3, callback=lambda algorithm: bests.append(float(algorithm.opt[0].F[0])))
@@ -68,7 +63,7 @@ def test_moves_as_the_equations_say(limit: str | float, fraction: float) -> None
     np.testing.assert_array_equal(bests, literal)
 
 
-def test_the_paper_s_settings_make_12000_evaluations_and_every_evaluator_gives_the_same_run() -> None:
+def test_the_paper_s_settings_make_12000_evaluations_and_every_evaluator_gives_the_same_run():
     for termination in (("n_eval", 12000), ("n_iter", 150), None):
         result = minimize(Valley(), PaperPSO(), termination, seed=1)
         assert result.algorithm.evaluator.n_eval == 12000
@@ -84,7 +79,7 @@ def test_the_paper_s_settings_make_12000_evaluations_and_every_evaluator_gives_t
         assert other.algorithm.evaluator.n_eval == light.algorithm.evaluator.n_eval == 12000
 
     class Talkative(Valley):
-        def _evaluate(self, x: Array, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
+        def _evaluate(self, x, out, *args, **kwargs):
             super()._evaluate(x, out, *args, **kwargs)
             out["twice"] = 2.0 * valley(x)
 
@@ -99,12 +94,12 @@ def test_the_paper_s_settings_make_12000_evaluations_and_every_evaluator_gives_t
     (Problem(n_var=2, n_obj=1, xl=0.0, xu=np.inf), "expected a finite box"),
     (Problem(n_var=2, n_obj=1, xl=1.0, xu=0.0), "expected a finite box"),
 ])  # fmt: skip
-def test_refuses_problems_it_cannot_search(problem: Problem, sentence: str) -> None:
+def test_refuses_problems_it_cannot_search(problem, sentence):
     with pytest.raises(ValueError, match=sentence):
         minimize(problem, PaperPSO(), seed=1)
 
 
-def test_the_catalogue_stretches_the_schedule_over_the_budget() -> None:
+def test_the_catalogue_stretches_the_schedule_over_the_budget():
     for budget, n_particles, n_iterations in ((12000, 80, 150), (81, 80, 2), (80, 80, 1), (7, 7, 1)):
         problem, other = Valley(), Valley()
         minimize(problem, IDENTIFIERS["pso"].build(budget), ("n_gen", 2), seed=1)
@@ -118,7 +113,7 @@ def test_the_catalogue_stretches_the_schedule_over_the_budget() -> None:
     assert IDENTIFIERS["pso"].with_options({}) is IDENTIFIERS["pso"]
     for wrong in (0, -5, 1.5, "12"):
         with pytest.raises(ValueError, match="expected a whole number above 0"):
-            IDENTIFIERS["pso"].build(wrong)  # type: ignore[arg-type]
+            IDENTIFIERS["pso"].build(wrong)
 
 
 @pytest.mark.parametrize(("obj", "sentence"), [
@@ -126,7 +121,7 @@ def test_the_catalogue_stretches_the_schedule_over_the_budget() -> None:
     (dict, "expected a subclass"), (lambda budget, more: PaperPSO(), "expected a subclass"),
     (lambda budget: budget, "identifier 'mine' returned a int, expected an Algorithm"),
 ])  # fmt: skip
-def test_as_identifier_refuses(obj: Any, sentence: str) -> None:
+def test_as_identifier_refuses(obj, sentence):
     with pytest.raises(ValueError, match=sentence):
         as_identifier("mine", obj).build(10)
     with pytest.raises(ValueError, match="takes no options"):

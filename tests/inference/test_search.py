@@ -20,7 +20,7 @@ from armid.inference.search import BEAM, MOST_EFFECTS, Exploration, drops, has_t
 from armid.model import EFFECTS, Model
 from armid.record import read_campaign
 
-MANOEUVRES = ("--manoeuvres", "lower,raise,short,empty", "--holdout", "", "--repeats", "1", "--duration", "1.0")
+MANOEUVRES = ("--manoeuvres", "lower,raise,short,empty", "--holdout", "", "--repeats", "1", "--duration", "0.8")
 # Candidates of one compiled model, of which a test asks for some.
 FEW = ("coulomb", "flux_saturation", "stribeck", "supply_sag")
 
@@ -135,8 +135,7 @@ def model(names):
 def exploration(posteriors, expanded=(), misfit=False, monkeypatch=None):
     """Return an exploration of models, names -> log posterior, the best of which leaves more than noise or does not."""
     fit = SimpleNamespace(records=SimpleNamespace(data=SimpleNamespace(cover=None)))
-    found = Exploration(None, {}, fits={model(n): fit for n in posteriors},
-                        forecasts={model(n): [] for n in expanded})  # fmt: skip
+    found = Exploration(None, {}, fits={model(n): fit for n in posteriors}, forecasts={model(n): [] for n in expanded})
     ranked = sorted(((model(n), p) for n, p in posteriors.items()), key=lambda pair: -pair[1])
     monkeypatch.setattr(found, "ranked", lambda: ranked)
     monkeypatch.setattr(search, "is_significant", lambda _: misfit)

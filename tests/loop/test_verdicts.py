@@ -207,7 +207,7 @@ def test_noise_that_no_rest_tells_is_told_of_the_records_that_lack_one(known, wh
     assert said[1] == f"No rest tells the noise{where}: the residual is tested against itself."
 
 
-def test_the_parts_of_a_diagnosis_are_bars_from_noise_the_largest_first() -> None:
+def test_the_parts_of_a_diagnosis_are_bars_from_noise_the_largest_first():
     before = Diagnosis((Finding("record", "a.csv", 4.0, 0.1), Finding("record", "b.csv", 9.0, 0.0),
                         Finding("dependence", "omega", 0.5, 0.9)), noise_known=True)  # fmt: skip
     after = Diagnosis((Finding("record", "b.csv", 1.5, 0.4),), noise_known=True)
@@ -223,8 +223,8 @@ def test_the_parts_of_a_diagnosis_are_bars_from_noise_the_largest_first() -> Non
     pyplot().close(figure)
 
 
-def test_parameters_are_drawn_in_percent_of_their_value_with_the_truth_where_it_is_known() -> None:
-    def entry(value: float, low: float, high: float, trusted: bool = True) -> dict[str, object]:
+def test_parameters_are_drawn_in_percent_of_their_value_with_the_truth_where_it_is_known():
+    def entry(value, low, high, trusted=True):
         return {"value": value, "low": low, "high": high, "unit": "Pa", "trusted": trusted}
 
     after = {"p0": entry(2e6, 1.9e6, 2.2e6), "sag": entry(-4.0, -5.0, -3.0), "off": entry(0.0, -1.0, 1.0)}

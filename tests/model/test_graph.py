@@ -1,7 +1,6 @@
 """Argument names bind equations: own names first, then the plant's; what cannot be bound is refused with a sentence."""
 
 import math
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -16,7 +15,7 @@ ARM, AXIS = PLANTS["shell_transfer_arm"], PLANTS["driven_axis"]
 LEVEL = (Parameter("level", "effort", 0.0, 1.0, null=0.0),)
 
 
-def bound(model: Model, key: str) -> dict[str, str]:
+def bound(model, key):
     return dict(model.graph.nodes[key].arguments)
 
 
@@ -24,7 +23,7 @@ def zero():
     return 0.0
 
 
-def test_own_names_come_before_the_plants_and_an_argument_may_be_bound_to_another_name() -> None:
+def test_own_names_come_before_the_plants_and_an_argument_may_be_bound_to_another_name():
     own = Effect("own", (Parameter("omega", "1", 0, 1), Parameter("R", "1", 0, 1)), {"torque": lambda omega, R, K: K},
                  (State("current", "A", lambda current: current, zero),))  # fmt: skip
     model = Model(ARM) + own
@@ -48,12 +47,12 @@ BOUND = {
 
 
 @pytest.mark.parametrize("case", BOUND)
-def test_what_can_be_asked_for(case: str) -> None:
+def test_what_can_be_asked_for(case):
     plant, port, function, expected = BOUND[case]
     assert bound(Model(plant) + Effect("e", LEVEL, {port: function}), f"e__{port}") == expected
 
 
-def test_an_initial_value_takes_what_moves_at_the_start_and_that_of_other_states() -> None:
+def test_an_initial_value_takes_what_moves_at_the_start_and_that_of_other_states():
     """Through ports, effects and switches; a quantity that does not move stands for itself."""
     lag = State("lag", "V", lambda lag, omega: omega - lag, lambda voltage, gravity_level: voltage + gravity_level)
     model = Model(ARM) + Effect("e", LEVEL, {"torque": lambda lag, level: level * lag}, (lag,))
@@ -71,7 +70,7 @@ def test_an_initial_value_takes_what_moves_at_the_start_and_that_of_other_states
     assert bound(model, "initial__e__lag") == {"omega": "initial__omega", "theta_C": "theta_C"}
 
 
-def test_ports_sum_what_effects_add_and_the_graph_knows_what_depends_on_the_motion() -> None:
+def test_ports_sum_what_effects_add_and_the_graph_knows_what_depends_on_the_motion():
     one, two = (Effect(n, LEVEL, {"torque": lambda level: level}) for n in ("one", "two"))
     graph = (Model(ARM) + one + two).graph
     assert graph.nodes["torque"].terms == ("one__torque", "two__torque")
@@ -91,7 +90,7 @@ def test_ports_sum_what_effects_add_and_the_graph_knows_what_depends_on_the_moti
     assert "e__torque" in (Model(ARM) + Effect("e", LEVEL, {"torque": torque})).graph.nodes
 
 
-def with_state(rate: Callable[..., float], start: Callable[..., float]) -> Effect:
+def with_state(rate, start):
     return Effect("e", LEVEL, {"torque": lambda x: x}, (State("x", "1", rate, start),))
 
 
@@ -114,18 +113,18 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_what_cannot_be_bound_is_refused(case: str) -> None:
+def test_what_cannot_be_bound_is_refused(case):
     effect, sentence = REFUSED[case]
     with pytest.raises(ArmidError, match=sentence) as refusal:
         Model(ARM) + effect
     assert "\n" not in str(refusal.value)
 
 
-def circle() -> Model:
+def circle():
     return Model(replace(AXIS, quantities={**AXIS.quantities, "a": lambda b: b, "b": lambda c: c, "c": lambda a, v: a}))
 
 
-def unknown() -> Model:
+def unknown():
     return Model(replace(AXIS, quantities={**AXIS.quantities, "drive_effort": lambda gain, voltage: 0}))
 
 
@@ -155,7 +154,7 @@ DECLARED = {
 
 
 @pytest.mark.parametrize("case", DECLARED)
-def test_a_declaration_that_contradicts_itself_is_refused(case: str) -> None:
+def test_a_declaration_that_contradicts_itself_is_refused(case):
     make, sentence = DECLARED[case]
     with pytest.raises(ArmidError, match=sentence):
         make()

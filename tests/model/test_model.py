@@ -15,7 +15,7 @@ COULOMB, VISCOUS = EFFECTS["coulomb"], EFFECTS["viscous"]
 LEVEL = (Parameter("level", "effort", 0.0, 1.0, null=0.0),)
 
 
-def test_plus_adds_in_order_and_minus_takes_away_and_the_model_is_left_alone() -> None:
+def test_plus_adds_in_order_and_minus_takes_away_and_the_model_is_left_alone():
     bare = Model(ARM)
     model = bare + VISCOUS + COULOMB
     assert [e.name for e in model.effects] == ["viscous", "coulomb"]
@@ -37,7 +37,7 @@ def test_plus_adds_in_order_and_minus_takes_away_and_the_model_is_left_alone() -
     (Model(ARM) + COULOMB + VISCOUS, "arm_with_friction.txt"),
     (Model(PLANTS["driven_axis"]) + EFFECTS["torque_offset"], "axis_with_offset.txt"),
 ])  # fmt: skip
-def test_a_model_shows_its_equations(model: Model, file: str) -> None:
+def test_a_model_shows_its_equations(model, file):
     assert str(model) == (HERE / file).read_text(encoding="utf-8").rstrip("\n")
 
 
@@ -67,11 +67,11 @@ def branches(omega, level):
     (lambda omega, level: -level * omega**3, "e.torque = -e.level * omega ** 3"),
     (lambda level: level * np.pi, "e.torque = e.level * pi"),
 ])  # fmt: skip
-def test_right_hand_sides(function, text) -> None:
+def test_right_hand_sides(function, text):
     assert text in [line.strip() for line in str(Model(ARM) + Effect("e", LEVEL, {"torque": function})).splitlines()]
 
 
-def test_states_and_switches_of_effects_are_qualified_and_shown() -> None:
+def test_states_and_switches_of_effects_are_qualified_and_shown():
     def rate(omega, x):
         return omega - x
 
@@ -98,7 +98,7 @@ ROTARY = Scales(effort=1000.0, speed=2.0)
 AXIS = Scales(effort=150.0, speed=0.3, effort_unit="N", length_unit="m")
 
 
-def test_names_and_units_that_stay_and_those_that_are_refused() -> None:
+def test_names_and_units_that_stay_and_those_that_are_refused():
     for name in ("p0", "eta3", "h", "np", "abs", "I6_loaded", "match"):
         check_name(name, "parameter")
     for name in ("a b", "2a", "lambda", "a__b", "_a", "a_", "", "a.b"):
@@ -121,7 +121,7 @@ def test_names_and_units_that_stay_and_those_that_are_refused() -> None:
     ("effort/speed^2", ROTARY, "N m s2/rad2", 250.0), ("inertia", ROTARY, "kg m2", 500.0), ("effort", AXIS, "N", 150.0),
     ("effort/speed", AXIS, "N s/m", 500.0), ("inertia", AXIS, "kg", 500.0), ("speed*s", AXIS, "m", 0.3),
 ])  # fmt: skip
-def test_products_of_scales_become_si(unit: str, scales: Scales, si: str, size: float) -> None:
+def test_products_of_scales_become_si(unit, scales, si, size):
     found = resolve(Parameter("c", unit, -1.0, 2.0, null=0.0, fixed=0.5, nominal=0.25), scales)
     assert found.unit == si
     assert (found.low, found.high) == pytest.approx((-size, 2 * size))

@@ -20,7 +20,7 @@ START = np.array([0.1, 0.5, 0.05, 0.4])
 STARTS = dict(zip(("start_motor", "start_motor_speed", "start_load", "start_load_speed"), START, strict=True))
 
 
-def test_one_simulation_gives_all_outputs_as_scipy_does_and_loses_all_where_it_diverges() -> None:
+def test_one_simulation_gives_all_outputs_as_scipy_does_and_loses_all_where_it_diverges():
     u = drive(400, 1.0)
     run = simulate(Model(two_inertias), Manoeuvre(INTERVAL, 400, STARTS, {"u": u}), list(TRUTH.values()), Schedule(8))
     expected = oracle(u, START)
@@ -38,7 +38,7 @@ def test_one_simulation_gives_all_outputs_as_scipy_does_and_loses_all_where_it_d
     assert np.isnan(run.outputs[:, 1, -1]).all()
 
 
-def test_the_old_way_declares_one_output_and_a_wrong_one_is_refused() -> None:
+def test_the_old_way_declares_one_output_and_a_wrong_one_is_refused():
     for plant in PLANTS.values():
         for one in (plant, *plant.variants):
             if one.records_one_speed:
@@ -51,24 +51,14 @@ def test_the_old_way_declares_one_output_and_a_wrong_one_is_refused() -> None:
         Output("angle", "q", "deg")
     with pytest.raises(ArmidError, match="a name that ends in _deg or _rad"):
         Output("angle", "q", "rad", ("angle",))
-
-
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"output": "v"}, "one of them, or the first output 'recorded_speed' in rad/s"),
-        ({"outputs": two_inertias.outputs[:1] * 2}, "each name once"),
-        ({"outputs": (Output("a", "speeed", "rad/s"),), "output": ""}, "records 'speeed': did you mean"),
-        ({"outputs": (replace(two_inertias.outputs[0], port="sensor"),)}, "through the port 'sensor'"),
-    ],
-)
-def test_a_wrong_declaration_is_refused(changes, said) -> None:
-    with pytest.raises(ArmidError, match=said):
-        replace(two_inertias, **changes)
+    with pytest.raises(ArmidError, match="one of them, or the first output 'recorded_speed' in rad/s"):
+        replace(two_inertias, output="v")
+    with pytest.raises(ArmidError, match="each name once"):
+        replace(two_inertias, outputs=two_inertias.outputs[:1] * 2)
 
 
 @pytest.mark.slow
-def test_a_sensor_has_effects_at_the_port_of_its_output() -> None:
+def test_a_sensor_has_effects_at_the_port_of_its_output():
     found = sensor_effects(two_inertias)
     assert list(found) == ["load_angle_bias", "load_angle_scale", "load_angle_delay", "load_angle_lag"]
     u = drive(300, 1.0)
@@ -83,20 +73,19 @@ def test_a_sensor_has_effects_at_the_port_of_its_output() -> None:
     assert [p for p in check_plant(two_inertias) if not p.passed] == []
 
 
-def test_simulate_writes_every_output(tmp_path) -> None:
+def test_simulate_writes_every_output(tmp_path):
     folder = write_drive(tmp_path / "drive", more="".join(f"constants.{name} = 0.0\n" for name in STARTS))
     plugin = f"--plugin={Path(__file__).parent / 'two_inertias.py'}:two_inertias"
     values = [f"--set={name}={value}" for name, value in TRUTH.items()]
     assert ended("simulate", folder, plugin, *values, "--out", tmp_path / "out") == 0
     table = read_table(tmp_path / "out" / "b.csv", "b.csv").columns
-    assert list(table) == ["time_s", "motor_speed_rad_s", "load_angle_deg", "deflection_rad",
-                           "load_speed_rad_s"]  # fmt: skip
+    assert list(table) == ["time_s", "motor_speed_rad_s", "load_angle_deg", "deflection_rad", "load_speed_rad_s"]
     measured = read_table(folder / "a.csv", "a.csv").columns
     simulated = read_table(tmp_path / "out" / "a.csv", "a.csv").columns
     assert np.std(measured["load_angle_deg"] - simulated["load_angle_deg"]) < np.rad2deg(2.0 * NOISE_ANGLE)
 
 
-def test_a_record_brings_any_outputs_in_the_unit_of_its_header(tmp_path) -> None:
+def test_a_record_brings_any_outputs_in_the_unit_of_its_header(tmp_path):
     campaign = read_campaign(write_drive(tmp_path / "drive"), {"two_inertias": two_inertias})
     assert [o.name for o in campaign.plant.outputs] == ["motor_speed", "load_angle", "deflection"]
     assert [o.name for o in campaign.unmeasured] == ["load_speed"]
@@ -109,7 +98,7 @@ def test_a_record_brings_any_outputs_in_the_unit_of_its_header(tmp_path) -> None
     assert angle.noise.rms == pytest.approx(NOISE_ANGLE, rel=0.15)
 
 
-def test_every_state_of_the_start_comes_from_the_outputs_unless_it_is_given(tmp_path) -> None:
+def test_every_state_of_the_start_comes_from_the_outputs_unless_it_is_given(tmp_path):
     """A record in motion: what nothing shows keeps its default and the plant's size; errors are within deviations."""
     campaign = read_campaign(write_drive(tmp_path / "drive"), {"two_inertias": two_inertias})
     _, train, held = campaign.records
@@ -132,14 +121,11 @@ def test_every_state_of_the_start_comes_from_the_outputs_unless_it_is_given(tmp_
         read_campaign(write_drive(tmp_path / "again", more=f"{given}restart_s = 1.0\n"), {"two_inertias": two_inertias})
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (lambda text: text.replace("load_angle_deg", "load_angle_grad"), "load_angle_deg"),
-        (lambda text: text.replace("load_angle_deg", "motor_speed_deg_s", 1), "one column of motor_speed is expected"),
-    ],
-)
-def test_columns_that_say_nothing_clear_are_refused(tmp_path, change, said) -> None:
+@pytest.mark.parametrize(("change", "said"), [
+    (lambda text: text.replace("load_angle_deg", "load_angle_grad"), "load_angle_deg"),
+    (lambda text: text.replace("load_angle_deg", "motor_speed_deg_s", 1), "one column of motor_speed is expected"),
+])  # fmt: skip
+def test_columns_that_say_nothing_clear_are_refused(tmp_path, change, said):
     folder = write_drive(tmp_path / "drive")
     for name in "bc":
         path = folder / f"{name}.csv"

@@ -32,7 +32,7 @@ def ready(campaign):
     return replays(campaign.train, model, space_of(model))
 
 
-def test_the_start_is_fitted_and_leaves_noise(ready) -> None:
+def test_the_start_is_fitted_and_leaves_noise(ready):
     """Also the motor's state, which no output of the second record shows; outputs of a file share their simulation."""
     assert [r.name for r in ready] == ["a.csv, motor_speed", "a.csv, load_angle", "a.csv, deflection",
                                        "b.csv, load_angle"]  # fmt: skip
@@ -60,7 +60,7 @@ def test_the_start_is_fitted_and_leaves_noise(ready) -> None:
     )
 
 
-def test_samples_that_are_no_data_tell_nothing_of_the_start(tmp_path) -> None:
+def test_samples_that_are_no_data_tell_nothing_of_the_start(tmp_path):
     folder = write_drive(tmp_path / "c")
     columns = dict(read_table(folder / "b.csv", "b.csv").columns)
     columns["load_angle_deg"][60:260] = columns["load_angle_deg"][60]
@@ -77,7 +77,7 @@ def test_samples_that_are_no_data_tell_nothing_of_the_start(tmp_path) -> None:
 
 
 @pytest.mark.parametrize("fitness", ["rmse", "likelihood", "rmse:load_angle"])
-def test_least_squares_finds_the_truth(campaign, fitness) -> None:
+def test_least_squares_finds_the_truth(campaign, fitness):
     model = Model(campaign.plant)
     identifier = IDENTIFIERS["least_squares"]
     found = identify(campaign, model, space_of(model), fitness_of_name(fitness, FITNESS), identifier, 3000)
@@ -96,7 +96,7 @@ def test_least_squares_finds_the_truth(campaign, fitness) -> None:
     assert len(details_of(found)["records"]) == 7
 
 
-def test_a_fitness_names_an_output(ready) -> None:
+def test_a_fitness_names_an_output(ready):
     space = space_of(ready[0].model)
     alone = IdentificationProblem(space, ready, fitness_of_name("rmse:motor_speed", FITNESS))
     assert [r.name for r in alone.replays] == ["a.csv, motor_speed"]
@@ -112,7 +112,7 @@ def test_a_fitness_names_an_output(ready) -> None:
         fitness_of_name("rms:load_angle", FITNESS)
 
 
-def test_an_examination_holds_the_truth_and_what_two_signals_of_one_unit_may_be_mistaken_for(campaign) -> None:
+def test_an_examination_holds_the_truth_and_what_two_signals_of_one_unit_may_be_mistaken_for(campaign):
     model = Model(campaign.plant)
     found = examine(campaign, model, space_of(model))
     inside = [p.low <= TRUTH[p.name] <= p.high for p in found.profiles]

@@ -29,7 +29,7 @@ def closed(tmp_path_factory):
     return close_loop(campaign.model(), campaign, {**wanted, **sensor_effects(campaign.plant)})
 
 
-def test_the_missing_friction_is_named_the_rest_is_noise_and_the_start_held_out_does_not_judge(closed) -> None:
+def test_the_missing_friction_is_named_the_rest_is_noise_and_the_start_held_out_does_not_judge(closed):
     """The bias of the load's angle is none: a start that is fitted makes up for all of it."""
     assert (closed.verdict, closed.effects) == ("explained", ("coulomb",))
     found = {e.name: e for e in closed.after.estimates}
@@ -46,7 +46,7 @@ def test_the_missing_friction_is_named_the_rest_is_noise_and_the_start_held_out_
     np.testing.assert_array_equal(again.residual, closed.after.holdout.residual)
 
 
-def test_the_report_tells_each_output_and_its_residual_is_drawn_against_speed_and_position(closed) -> None:
+def test_the_report_tells_each_output_and_its_residual_is_drawn_against_speed_and_position(closed):
     report, details = report_of(closed), details_of(closed)
     assert list(report["outputs"]) == ["motor_speed", "load_angle", "deflection"]
     assert (report["unit"], report["outputs"]["deflection"]["unit"]) == ("rad/s", "rad")
@@ -79,7 +79,7 @@ def sound(tmp_path):
     return read_campaign(write_drive(tmp_path / "drive"), {"two_inertias": two_inertias})
 
 
-def test_where_nothing_is_missing_no_sensor_is_accused(sound) -> None:
+def test_where_nothing_is_missing_no_sensor_is_accused(sound):
     """The angle of the shaft is small: a larger gain of its sensor would shrink the noise in it as well."""
     found = close_loop(sound.model(), sound, {"coulomb": EFFECTS["coulomb"]})
     assert (found.verdict, found.effects, found.suspects) == ("no_discrepancy", (), ())
@@ -91,7 +91,7 @@ def test_where_nothing_is_missing_no_sensor_is_accused(sound) -> None:
 @pytest.mark.parametrize(("file", "kind", "value", "alone"), [
     ("a.csv", "gain", 0.03, False), ("a.csv", "late", 0.015, True),
 ])  # fmt: skip
-def test_a_fault_of_one_sensor_is_told(sound, file, kind, value, alone) -> None:
+def test_a_fault_of_one_sensor_is_told(sound, file, kind, value, alone):
     """Of several outputs one sensor is at fault; starts are fitted meanwhile."""
     fault = Fault(kind, alone=alone)
     records = tuple(trimmed(fault, r, -value, sound.plant, "load_angle") if r.file == file else r

@@ -1,19 +1,13 @@
 """A drive of two inertias with four outputs, and records of it that scipy makes: no line of the engine is in them."""
 
-from collections.abc import Mapping
 from functools import cache
 from itertools import pairwise
-from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from armid.model import Constant, Input, Output, Parameter, Plant, Scales, State
 from armid.record import write_campaign
-
-Array = NDArray[np.float64]
-
 
 two_inertias = Plant(
     name="two_inertias",
@@ -50,18 +44,18 @@ TRUTH = {"motor": 0.1, "load": 0.08, "stiffness": 25.0, "damping": 0.12}
 INTERVAL, NOISE_SPEED, NOISE_ANGLE = 0.004, 0.02, 0.002
 
 
-def drive(n_samples: int, pace: float) -> Array:
+def drive(n_samples, pace):
     times = INTERVAL * np.arange(n_samples)
     return 1.2 * np.sin(2.0 * pace * times) + 0.8 * np.sin(5.3 * pace * times + 0.4)
 
 
 @cache
-def motion(n_samples: int, pace: float, start: tuple[float, ...], friction: float) -> dict[str, Array]:
+def motion(n_samples, pace, start, friction):
     """Return the motion of a record; the integrator is slow, and many tests want the same ones."""
     return oracle(drive(n_samples, pace), np.array(start), friction)
 
 
-def oracle(u: Array, start: Array, friction: float = 0.0, truth: Mapping[str, float] = TRUTH) -> dict[str, Array]:
+def oracle(u, start, friction=0.0, truth=TRUTH):
     """Return motor and load angle and speed at the samples; friction: Coulomb, of the motor [N m], width 0.025 rad/s.
 
     start: q, v, p, w. The drive runs straight between samples, so that each interval is integrated by itself.
@@ -81,9 +75,7 @@ def oracle(u: Array, start: Array, friction: float = 0.0, truth: Mapping[str, fl
     return {"q": q, "v": v, "p": p, "w": w}
 
 
-def made_columns(
-    seed: int, n_samples: int, pace: float, start: Array, friction: float = 0.0, bias: float = 0.0
-) -> dict[str, Array]:
+def made_columns(seed, n_samples, pace, start, friction=0.0, bias=0.0):
     """Return the columns of a noisy record; bias: of the load's angle [rad]."""
     u, rng = drive(n_samples, pace), np.random.default_rng(seed)
     moved = motion(n_samples, pace, tuple(start), friction)
@@ -96,7 +88,7 @@ def made_columns(
     }  # fmt: skip
 
 
-def write_drive(folder: Path, friction: float = 0.0, bias: float = 0.0, more: str = "") -> Path:
+def write_drive(folder, friction=0.0, bias=0.0, more=""):
     """Write a campaign: two records to train, the second in motion at its start and with one output; one held out."""
     starts = {"a": np.zeros(4), "b": np.array([0.3, 2.0, 0.25, 1.6]), "c": np.array([-0.2, 1.0, -0.2, 1.2])}
     tables = {

@@ -4,16 +4,14 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from arm_cases import REFERENCE
 from armid.problem.similarity import numerical_similarity, similarity
 
 INTERVAL, EPSILON, XI, THRESHOLD = 0.001, 0.03, 0.030, 0.2
-Array = NDArray[np.float64]
 
 
-def literal_s1(x: Array, y: Array) -> float:
+def literal_s1(x, y):
     """Eqs 11-13, case by case; negative s_i clipped to 0."""
     total = 0.0
     for a, b in zip(x, y, strict=True):
@@ -27,7 +25,7 @@ def literal_s1(x: Array, y: Array) -> float:
     return float(total / sum(abs(a) for a in x))
 
 
-def literal_landmarks(x: Array, interval: float, epsilon: float, xi: float) -> tuple[list[int], list[float]]:
+def literal_landmarks(x, interval, epsilon, xi):
     """Steps 1 to 4 of section III.B; returns the ends of the subintervals and the normalised levels there."""
     low, high = min(x), max(x)
     level = [float((v - low) / (high - low)) for v in x]
@@ -46,7 +44,7 @@ def literal_landmarks(x: Array, interval: float, epsilon: float, xi: float) -> t
         del extrema[k : k + 2]
 
 
-def literal_pairs(ends: list[int], ends2: list[int]) -> list[tuple[int, int]]:
+def literal_pairs(ends, ends2):
     """Pair subintervals by order, or by overlap, largest first, when their numbers differ."""
     n, n2 = len(ends) - 1, len(ends2) - 1
     if n == n2:
@@ -57,14 +55,14 @@ def literal_pairs(ends: list[int], ends2: list[int]) -> list[tuple[int, int]]:
             overlap = min(ends[i + 1], ends2[j + 1]) - max(ends[i], ends2[j])
             if overlap > 0:
                 overlaps.append((-overlap, i, j))
-    pairs: list[tuple[int, int]] = []
+    pairs = []
     for _, i, j in sorted(overlaps):
         if all(i != p and j != q for p, q in pairs):
             pairs.append((i, j))
     return pairs
 
 
-def literal_s2(x: Array, y: Array, interval: float, epsilon: float, xi: float, threshold: float) -> float:
+def literal_s2(x, y, interval, epsilon, xi, threshold):
     """Step 5 and Eq 14."""
     if min(y) == max(y):
         return 0.0
@@ -78,7 +76,7 @@ def literal_s2(x: Array, y: Array, interval: float, epsilon: float, xi: float, t
     return similar / (2 * (len(x) - 1) * interval)
 
 
-def agree(x: Array, rows: Array, interval: float, epsilon: float, xi: float, threshold: float) -> None:
+def agree(x, rows, interval, epsilon, xi, threshold):
     """Compare the fast degree of each row with the literal one."""
     s, s1, s2 = similarity(x, rows, interval, epsilon, xi, threshold)
     literal1 = [literal_s1(x, y) for y in rows]
@@ -90,7 +88,7 @@ def agree(x: Array, rows: Array, interval: float, epsilon: float, xi: float, thr
     assert ((s >= 0) & (s <= 1) & (s1 >= 0) & (s1 <= 1) & (s2 >= 0) & (s2 <= 1)).all()
 
 
-def smooth(rng: np.random.Generator, n: int) -> Array:
+def smooth(rng, n):
     t = np.linspace(0.0, 1.0, n)
     slow = np.sin(2 * np.pi * rng.uniform(0.3, 4) * t + rng.uniform(0, 6))
     return slow + 0.3 * np.sin(2 * np.pi * rng.uniform(1, 30) * t)
@@ -110,7 +108,7 @@ SERIES = {
 
 
 @pytest.mark.parametrize("kind", SERIES)
-def test_agrees_with_the_literal_equations(kind: str) -> None:
+def test_agrees_with_the_literal_equations(kind):
     rng = np.random.default_rng([*kind.encode()])
     for n in (2, 3, 5, 10, 40, 150):
         for _ in range(12):
@@ -124,7 +122,7 @@ def test_agrees_with_the_literal_equations(kind: str) -> None:
             agree(x, rows, *(float(rng.choice(values)) for values in options))
 
 
-def test_agrees_with_the_literal_equations_on_the_arm() -> None:
+def test_agrees_with_the_literal_equations_on_the_arm():
     """Angular velocities [rad/s] of the reference arm at 1 kHz, the first 0.7 s."""
     files, rng = sorted(REFERENCE.glob("trajectory_*.csv")), np.random.default_rng(1)
     trajectories = np.array([np.loadtxt(file, delimiter=",", skiprows=1, usecols=2)[:701] for file in files])
@@ -137,7 +135,7 @@ def test_agrees_with_the_literal_equations_on_the_arm() -> None:
         agree(np.round(noisy / gyro) * gyro, trajectories[::5], INTERVAL, EPSILON, XI, 2.0)
 
 
-def test_values_by_hand() -> None:
+def test_values_by_hand():
     x = np.array([0.0, 1.0, 2.0, 1.0, 0.0])
     rows = np.array([2 * x, -x, 0 * x, 0.5 * x, [0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 2.0, 1.0, 1.0, 0.0]])
     s, s1, s2 = similarity(x, rows, 1.0, slope_threshold=0.3)
@@ -148,7 +146,7 @@ def test_values_by_hand() -> None:
     np.testing.assert_allclose(s, np.sqrt(s1 * s2))
 
 
-def test_a_failed_candidate_harms_no_other_a_diverged_one_stays_within_bounds_and_layouts_do_not_matter() -> None:
+def test_a_failed_candidate_harms_no_other_a_diverged_one_stays_within_bounds_and_layouts_do_not_matter():
     rng = np.random.default_rng(4)
     x, rows = smooth(rng, 701), np.array([smooth(rng, 701) for _ in range(12)])
     clean = np.array(similarity(x, rows, INTERVAL))
@@ -180,7 +178,7 @@ def test_a_failed_candidate_harms_no_other_a_diverged_one_stays_within_bounds_an
     (np.arange(5.0), {"slope_threshold": np.nan}, "slope_threshold nan"),
     (np.arange(5.0), {"epsilon": -0.1}, "epsilon is -0.1"), (np.arange(5.0), {"xi": np.inf}, "xi inf"),
 ])  # fmt: skip
-def test_refuses_in_a_sentence(measured: Array, options: dict[str, float], sentence: str) -> None:
+def test_refuses_in_a_sentence(measured, options, sentence):
     with pytest.raises(ValueError, match=sentence):
         similarity(measured, np.ones((1, 5)), **{"interval": 0.001, **options})
     with pytest.raises(ValueError, match="zero throughout"):

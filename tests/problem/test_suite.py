@@ -2,8 +2,6 @@
 
 import hashlib
 import os
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -12,6 +10,7 @@ from pymoo.core.problem import Problem
 import armid
 from armid.errors import ArmidError
 from armid.problem.suite import CLASSES_OF_FORMS, DEFINITIONS
+from commands import python
 
 # Problem of version 1 -> i and the value at the point u_j = frac(i sqrt(j + 2)).
 STORED = {
@@ -75,8 +74,7 @@ def test_making_the_suite_compiles_nothing(tmp_path):
     """In a process of its own, whose compile cache stays empty until the first call."""
     program = ("import armid, os, sys; problems = list(armid.suite()); before = os.listdir(sys.argv[1]); "
                "assert before == [], before; print(problems[0].n_var)")  # fmt: skip
-    done = subprocess.run([sys.executable, "-c", program, tmp_path], env=os.environ | {"ARMID_CACHE": str(tmp_path)},
-                          capture_output=True, text=True, check=False)  # fmt: skip
+    done = python("-c", program, tmp_path, env=os.environ | {"ARMID_CACHE": str(tmp_path)})
     assert (done.stdout, done.returncode) == ("4\n", 0), done.stderr
 
 

@@ -1,16 +1,11 @@
 """Small campaigns to read: an arm with rest, and a driven axis."""
 
-from collections.abc import Callable, Mapping
-from pathlib import Path
+from collections.abc import Mapping
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from input_texts import LOWERING
-
-Array = NDArray[np.float64]
-WriteCampaign = Callable[..., Path]
 
 ARM_TOML = f'name = "c00"\nplant = "shell_transfer_arm"\n\n{LOWERING}'
 AXIS_TOML = """\
@@ -26,14 +21,14 @@ role = "train"
 """
 
 
-def csv_text(columns: Mapping[str, Array]) -> str:
+def csv_text(columns):
     """Return columns as the text of a CSV file, every digit kept."""
     rows = zip(*(np.asarray(values, dtype=float).tolist() for values in columns.values()), strict=True)
     return "\n".join([",".join(columns), *(",".join(map(repr, row)) for row in rows)]) + "\n"
 
 
 @pytest.fixture
-def arm_columns() -> dict[str, Array]:
+def arm_columns():
     """Columns of a lowering: 100 ms of rest, then 1.2 s at 1 kHz."""
     rng = np.random.default_rng(1)
     times = np.arange(-100, 1201) / 1000
@@ -42,7 +37,7 @@ def arm_columns() -> dict[str, Array]:
 
 
 @pytest.fixture
-def axis_columns() -> dict[str, Array]:
+def axis_columns():
     """Columns of a driven axis: 5.5 s at 1 kHz, speed and position that belong together."""
     times = np.arange(5501) / 1000
     return {
@@ -54,13 +49,13 @@ def axis_columns() -> dict[str, Array]:
 
 
 @pytest.fixture
-def write(tmp_path: Path, arm_columns: dict[str, Array]) -> WriteCampaign:
+def write(tmp_path, arm_columns):
     """Return a function that writes a campaign, by default one lowering, and returns its folder.
 
     toml: the text of campaign.toml. files: name -> columns, text or bytes of a CSV file.
     """
 
-    def written(toml: str | bytes = ARM_TOML, **files: Mapping[str, Array] | str | bytes) -> Path:
+    def written(toml=ARM_TOML, **files):
         folder = tmp_path / "campaign"
         folder.mkdir(exist_ok=True)
         (folder / "campaign.toml").write_bytes(toml.encode() if isinstance(toml, str) else toml)
@@ -73,10 +68,10 @@ def write(tmp_path: Path, arm_columns: dict[str, Array]) -> WriteCampaign:
 
 
 @pytest.fixture
-def write_axis(write: WriteCampaign, axis_columns: dict[str, Array]) -> WriteCampaign:
+def write_axis(write, axis_columns):
     """Return a function that writes a campaign of a driven axis with one record, `move.csv`."""
 
-    def written(more: str = "", columns: Mapping[str, Array] | None = None, toml: str = AXIS_TOML) -> Path:
+    def written(more="", columns=None, toml=AXIS_TOML):
         return write(toml + more, move=axis_columns if columns is None else columns)
 
     return written

@@ -9,6 +9,7 @@ from armid.errors import ArmidError
 from armid.model import Constant, Input, Manoeuvre, Plant
 from armid.model.plants.driven_axis import driven_axis
 from armid.record import read_campaign
+from commands import refusing
 
 DEGREE, WAVE = np.pi / 180, np.sin(np.arange(5501) / 100)
 HOLDOUT = '\n[[records]]\nfile = "hold.csv"\nrole = "holdout"\n'
@@ -121,10 +122,8 @@ def test_refused(write_axis, axis_columns, more, change, fragments):
             del columns[name]
         else:
             columns[name] = np.full(5501, value) if isinstance(value, float) else value
-    with pytest.raises(ArmidError) as refusal:
+    with refusing(*fragments):
         read_campaign(write_axis(more, columns))
-    for fragment in fragments:
-        assert fragment in str(refusal.value)
     with pytest.raises(ArmidError, match=r"gyro_range_deg_s.*m/s"):
         read_campaign(write_axis(toml=AXIS.format("gyro_range_deg_s = 200")))
 
@@ -188,6 +187,5 @@ def test_what_is_known_beforehand_is_read(write_axis):
     ("gain = { mean = 35.0, sd = 1.0 }\n[constants]\ngain = 35.0", "one place is expected"),
 ])  # fmt: skip
 def test_a_prior_that_means_nothing_is_refused(write_axis, prior, said):
-    with pytest.raises(ArmidError) as refused:
+    with refusing(said):
         read_campaign(write_axis(toml=AXIS.format(f"[priors]\n{prior}\n")))
-    assert said in str(refused.value)

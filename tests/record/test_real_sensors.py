@@ -6,6 +6,7 @@ import warnings
 import numpy as np
 import pytest
 
+import synthetic
 from armid.errors import ArmidError
 from armid.model import Model
 from armid.problem.problem import replays
@@ -17,17 +18,13 @@ N, INTERVAL = 3000, 0.002
 TIMES = INTERVAL * np.arange(N)
 
 
-def wheel(seed=1, noise=0.02, gain=4.0, damping=0.3):
+def wheel(damping=0.3):
     """Return times, drive, angle, speed of a wheel J dw/dt = u - b w under a drive that steps; the speed has noise."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(1)
     drive = np.repeat(rng.choice([-1.0, -0.4, 0.5, 1.0], N // 300), 300)
-    speed, angle = np.zeros(N), np.zeros(N)
-    for i in range(N - 1):
-        kept = np.exp(-damping * INTERVAL)
-        speed[i + 1] = kept * speed[i] + gain / damping * (1.0 - kept) * drive[i]
-        angle[i + 1] = angle[i] + 0.5 * INTERVAL * (speed[i] + speed[i + 1])
+    speed, angle = synthetic.wheel(drive, INTERVAL, 4.0, damping)
     return {"time_s": TIMES, "drive_V": drive, "angle_rad": angle,
-            "angular_velocity_rad_s": speed + noise * rng.standard_normal(N)}  # fmt: skip
+            "angular_velocity_rad_s": speed + 0.02 * rng.standard_normal(N)}  # fmt: skip
 
 
 def read(write, columns, plant="driven_axis", more="", entry="", warns=()):

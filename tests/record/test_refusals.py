@@ -115,6 +115,10 @@ TOML = {
     "same file twice": (GOOD + ENTRY, ["'lower.csv'", "two records"]),
     "missing file": (GOOD.replace("lower.csv", "lowre.csv"), ["'lowre.csv' does not exist", "mean 'lower.csv'"]),
     "absolute file": (GOOD.replace("lower.csv", "/etc/lower.csv"), ["'/etc/lower.csv'", "out of the campaign"]),
+    "file above": (GOOD.replace("lower.csv", "../lower.csv"), ["out of the campaign"]),
+    "file above, round about": (GOOD.replace("lower.csv", "sub/../../lower.csv"), ["out of the campaign"]),
+    "file above, of Windows": (GOOD.replace("lower.csv", "..\\\\lower.csv"), ["lower.csv'"]),
+    "file of a drive": (GOOD.replace("lower.csv", "C:\\\\lower.csv"), ["lower.csv'"]),
     "zero in the name": (GOOD.replace("lower.csv", "lower\\u0000.csv"), ["CSV file"]),
     "broken TOML": (GOOD.replace("shell = true", "shell = = true"), ["campaign.toml", "not valid TOML", "line 9"]),
     "binary TOML": (b"\xff\xfe\x00\x01", ["campaign.toml, line 1", "UTF-8"]),
@@ -156,6 +160,11 @@ def test_other_than_a_campaign_links_out_of_its_folder_and_units_that_differ(wri
     os.symlink("lower.csv", folder / "lower.csv")
     assert_says(refusal(folder), ["'lower.csv' does not exist"])
     (folder / "lower.csv").unlink()
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "outside.csv").rename(tmp_path / "elsewhere" / "lower.csv")
+    (folder / "linked").symlink_to(tmp_path / "elsewhere")
+    folder = write(GOOD.replace("lower.csv", "linked/lower.csv"), other="")
+    assert_says(refusal(folder), ["'linked/lower.csv'", "links out of the campaign's folder"])
     second = ENTRY.replace("lower.csv", "second.csv")
     toml = GOOD.replace("shell_transfer_arm", "driven_axis").split("[[records]]")[0]
     toml += '[[records]]\nfile="lower.csv"\nrole="train"\n[[records]]\nfile="second.csv"\nrole="holdout"\n'

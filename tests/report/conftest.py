@@ -1,9 +1,6 @@
 """A browser, and pages as a user opens them."""
 
 import shutil
-from collections.abc import Callable, Iterator
-from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -13,7 +10,7 @@ FLAGS = ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-quic", "-
 
 
 @pytest.fixture(scope="session")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
+def browser(tmp_path_factory):
     """A headless Chromium of the system."""
     chromium, driver = shutil.which("chromium"), shutil.which("chromedriver")
     if chromium is None or driver is None:
@@ -31,10 +28,10 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
 
 
 @pytest.fixture
-def opened(browser: Any) -> Callable[..., Any]:
+def opened(browser):
     """Return a function that opens a page at a width [pixels], light or dark, with nothing on the console so far."""
 
-    def show(path: Path, width: int = 1200, dark: bool = False, script: bool = True) -> Any:
+    def show(path, width=1200, dark=False, script=True):
         screen = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600}
         scheme = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
         browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", screen)

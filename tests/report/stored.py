@@ -1,8 +1,6 @@
 """Folders as the commands write them, with numbers that nobody computed: they test pages, and claim nothing."""
 
 import json
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 from pandas import DataFrame
@@ -20,26 +18,26 @@ SVG = """<?xml version="1.0"?>
 <use xlink:href="#m1" x="10.98765" y="20"/></svg>"""
 
 
-def errors(rmse: float) -> dict[str, float]:
+def errors(rmse):
     return {"rmse": rmse, "nrmse": 0.01, "chi2_per_sample": 2.0, "s": 0.99, "s1": 0.98, "s2": 1.0}
 
 
-def parameter(value: float, unit: str = "1", sure: bool = True, cause: str = "noise") -> dict[str, Any]:
+def parameter(value, unit="1", sure=True, cause="noise"):
     return {"value": value, "unit": unit, "low": 0.9 * value, "high": 1.1 * value, "trusted": sure,
             "interval_holds": sure, "noise_low": 0.95 * value, "noise_high": 1.05 * value,
             "causes": [f"{cause}, 80%"]}  # fmt: skip
 
 
-def curve(n: int, size: float) -> dict[str, list[float]]:
+def curve(n, size):
     x = np.linspace(0.0, 1.2, n)
     return {"x": list(x), "y": list(size * np.sin(9.0 * x))}
 
 
-def made_by(command: str) -> dict[str, Any]:
+def made_by(command):
     return {"command": command, "settings": {"seed": 1, "plugins": [], "window": ""}}
 
 
-def loop_report(name: str = "arm") -> dict[str, Any]:
+def loop_report(name="arm"):
     """Return report.json of a loop that has added one effect."""
     before = {"p0": parameter(3.1e6, "Pa", False), "n": parameter(1.3, sure=False)}
     after = {"p0": parameter(3.0e6, "Pa", cause=name), "n": parameter(1.4), f"{name}_x.level": parameter(40.0, "N m")}
@@ -63,7 +61,7 @@ def loop_report(name: str = "arm") -> dict[str, Any]:
     }  # fmt: skip
 
 
-def loop_details(name: str = "arm", n_records: int = 2, n_points: int = 300) -> dict[str, Any]:
+def loop_details(name="arm", n_records=2, n_points=300):
     record = {"role": "train", "unit": "rad/s", "n_samples": n_points, "noise_rms": 0.004,
               "error": {"before": errors(0.02), "after": errors(0.005)},
               "curves": {"before": curve(n_points, 0.03), "after": curve(n_points, 0.004)}}  # fmt: skip
@@ -80,7 +78,7 @@ def loop_details(name: str = "arm", n_records: int = 2, n_points: int = 300) -> 
     }  # fmt: skip
 
 
-def write_loop(folder: Path, name: str = "arm", figures: bool = True) -> Path:
+def write_loop(folder, name="arm", figures=True):
     folder.mkdir()
     (folder / "report.json").write_text(json.dumps(loop_report(name)))
     (folder / "details.json").write_text(json.dumps(loop_details(name)))
@@ -90,7 +88,7 @@ def write_loop(folder: Path, name: str = "arm", figures: bool = True) -> Path:
     return folder
 
 
-def study_document(name: str = "made_up") -> Document:
+def study_document(name="made_up"):
     """Return the document of a study with a table of numbers and texts, some of them missing or infinite."""
     frame = DataFrame({"who": [f"{name} {w}" for w in "bcad"], "error": [0.02, np.inf, np.nan, 3e-9],
                        "cost": ["90 (1 %)", "inf (0 %)", "", "1200 (7 %)"]})  # fmt: skip

@@ -257,7 +257,7 @@ def test_damaged_curves_are_one_sentence(tmp_path):
     assert sorted(p.name for p in folder.iterdir()) == ["details.json", "report.json"]
 
 
-def around(inner: str) -> str:
+def around(inner):
     return f'<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink">{inner}</svg>'
 
 

@@ -1,14 +1,10 @@
 """How a program of the stand refuses, for all tests of it."""
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
-
 import pytest
 
 
 @pytest.fixture
-def refuses(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Callable[..., None]:
+def refuses(tmp_path, monkeypatch, capsys):
     """Return a function that calls a program of the stand: it has to refuse with one sentence and to write nothing."""
     (tmp_path / "file").write_text("mine")
     (tmp_path / "empty.toml").write_text("")
@@ -18,7 +14,7 @@ def refuses(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capt
     monkeypatch.chdir(tmp_path)
     before = sorted(tmp_path.rglob("*"))
 
-    def refused(main: Callable[[list[str]], Any], words: list[str], sentence: str) -> None:
+    def refused(main, words, sentence):
         assert main(words) == 2, words
         said = capsys.readouterr()
         assert sentence in said.err

@@ -1,9 +1,6 @@
 """Made-up campaigns of a blind suite: what may be true of them, and what a loop may say."""
 
 import copy
-from typing import Any
-
-import numpy as np
 
 NAMES = ("coulomb", "seal_friction", "tilt", "viscous", "supply_sag", "brush_drop")
 VERDICTS = ("no_discrepancy", "explained", "partly_explained", "unexplained", "cannot_tell_apart")
@@ -12,7 +9,7 @@ FLOOR = 0.005
 TRUE = {"p0": 3e6, "k": 1.0, "eta3": 0.6, "n": 1.2}
 
 
-def entry(label: str, *names: str, listed: bool = True, matching: bool = True, matters: bool = True) -> dict[str, Any]:
+def entry(label, *names, listed=True, matching=True, matters=True):
     told = {"port": "torque", "form": "f", "matching": matching, "listed": listed, "strength": 1, "sizes": {}}
     return {
         "class": label,
@@ -24,9 +21,7 @@ def entry(label: str, *names: str, listed: bool = True, matching: bool = True, m
     }
 
 
-def report(
-    verdict: str, *steps: tuple[str, tuple[str, ...], bool], after: float = FLOOR, bias: float = 0.0
-) -> dict[str, Any]:
+def report(verdict, *steps, after=FLOOR, bias=0.0):
     """Return a report: steps as (effect, alternatives, claimed); a group is as probable as a claim."""
     probable = {n: 0.99 / (1 + len(others)) for name, others, claimed in steps for n in (name, *others)
                 if claimed or others}  # fmt: skip
@@ -43,7 +38,7 @@ def report(
     }
 
 
-def made_entry(rng: np.random.Generator) -> dict[str, Any]:
+def made_entry(rng):
     label = str(rng.choice(CLASSES))
     n = {"control": 0, "two": 2, "one_stroke": int(rng.integers(0, 2))}.get(label, 1)
     names = [str(name) for name in rng.choice(NAMES, n, replace=False)]
@@ -51,7 +46,7 @@ def made_entry(rng: np.random.Generator) -> dict[str, Any]:
     return entry(label, *names, listed=listed, matching=matching, matters=matters)
 
 
-def made_report(rng: np.random.Generator, told: dict[str, Any]) -> dict[str, Any]:
+def made_report(rng, told):
     """Draw what a loop may say of it: often near the truth, at times anything."""
     near = [effect["name"] for effect in told["effects"] if rng.random() < 0.7]
     names = near + [str(n) for n in rng.choice(NAMES, rng.integers(0, 3), replace=False) if rng.random() < 0.3]

@@ -2,8 +2,6 @@
 
 import json
 import tomllib
-from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -30,18 +28,18 @@ RAISE = {"start_angle_deg": 20.0, "target_angle_deg": -45.0, "shell": False, "su
 
 
 @pytest.fixture(scope="module")
-def base(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def base(tmp_path_factory):
     folder = tmp_path_factory.mktemp("advice") / "base"
     folder.with_name("proof.toml").write_text(SMALL)
     assert make_base([str(folder), "--seed", "4", "--suite", str(folder.with_name("proof.toml"))]) == 0
     return folder
 
 
-def key_of(folder: Path) -> dict[str, Any]:
+def key_of(folder):
     return dict(json.loads(key_path(folder).read_text())["campaigns"])
 
 
-def write_reports(base: Path, folder: Path, **advice: list[dict[str, Any]]) -> Path:
+def write_reports(base, folder, **advice):
     """Write reports that leave the pair in doubt where advice is given, and explain all elsewhere."""
     for name, entry in key_of(base).items():
         given = [{"manoeuvre": m, "separates": entry["pair"], "power": 0.9} for m in advice.get(name, [])]
@@ -51,12 +49,12 @@ def write_reports(base: Path, folder: Path, **advice: list[dict[str, Any]]) -> P
     return folder
 
 
-def more(base: Path, reports: Path, out: Path) -> int:
+def more(base, reports, out):
     proof = ["--suite", str(base.with_name("proof.toml")), "--seed", "4"]
     return make_more([str(out), *proof, "--base", str(base), "--reports", str(reports)])
 
 
-def test_each_effect_of_a_pair_is_true_in_turn_and_the_proof_asks_for_six_pairs_of_twenty(base: Path) -> None:
+def test_each_effect_of_a_pair_is_true_in_turn_and_the_proof_asks_for_six_pairs_of_twenty(base):
     key = key_of(base)
     assert sorted(key) == ["a01", "a02", "b01", "b02"] == sorted(each.name for each in base.iterdir())
     assert [entry["effects"][0]["name"] for entry in key.values()] == ["brush_drop", "coulomb", "viscous", "tilt"]
@@ -74,7 +72,7 @@ def test_each_effect_of_a_pair_is_true_in_turn_and_the_proof_asks_for_six_pairs_
         }
 
 
-def test_one_record_more_and_the_others_as_they_were(base: Path, tmp_path: Path) -> None:
+def test_one_record_more_and_the_others_as_they_were(base, tmp_path):
     reports = write_reports(base, tmp_path / "reports", a01=[RAISE], a02=[RAISE], b02=[TOO_FAST, RAISE])
     assert more(base, reports, tmp_path / "out") == 0
     key = key_of(tmp_path / "out")
@@ -90,7 +88,7 @@ def test_one_record_more_and_the_others_as_they_were(base: Path, tmp_path: Path)
     assert [key[name]["in_doubt"] for name in ("a01_random", "b02_advised")] == [2, 1]
 
 
-def test_advice_that_the_arm_cannot_follow_leaves_the_campaign_as_it_was(base: Path, tmp_path: Path) -> None:
+def test_advice_that_the_arm_cannot_follow_leaves_the_campaign_as_it_was(base, tmp_path):
     reports = write_reports(base, tmp_path / "reports", a01=[TOO_FAST])
     assert more(base, reports, tmp_path / "out") == 0
     entry = key_of(tmp_path / "out")["a01_advised"]

@@ -3,8 +3,6 @@
 import json
 import re
 from collections import Counter
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -41,7 +39,7 @@ effects = ["none"]
 
 
 @pytest.fixture(scope="module")
-def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def small(tmp_path_factory):
     """Make four campaigns in one process: a control, an effect twice, one stroke."""
     folder = tmp_path_factory.mktemp("blind") / "suite"
     folder.with_name("small.toml").write_text(SMALL)
@@ -49,15 +47,15 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def words_of(suite: Path) -> list[str]:
+def words_of(suite):
     return ["--seed", "5", "--suite", str(suite)]
 
 
-def key_of(folder: Path) -> dict[str, Any]:
+def key_of(folder):
     return dict(json.loads(key_path(folder).read_text()))
 
 
-def test_the_suite_holds_what_the_question_asks_and_a_part_the_campaigns_of_the_whole() -> None:
+def test_the_suite_holds_what_the_question_asks_and_a_part_the_campaigns_of_the_whole():
     suite = read_suite(SUITE)
     cases = cases_of(suite, 1)
     counts = Counter(case.label for case in cases)
@@ -77,7 +75,7 @@ def test_the_suite_holds_what_the_question_asks_and_a_part_the_campaigns_of_the_
 
 
 @pytest.mark.slow
-def test_a_suite_is_the_same_from_one_process_or_two(small: Path, tmp_path: Path) -> None:
+def test_a_suite_is_the_same_from_one_process_or_two(small, tmp_path):
     again = tmp_path / "suite"
     assert main([str(again), *words_of(small.with_name("small.toml")), "--processes", "2"]) == 0
     for file in (each for each in small.rglob("*") if each.is_file()):
@@ -85,7 +83,7 @@ def test_a_suite_is_the_same_from_one_process_or_two(small: Path, tmp_path: Path
     assert key_path(again).read_bytes() == key_path(small).read_bytes()
 
 
-def test_a_campaign_tells_nothing_of_its_truth_and_the_package_reads_it(small: Path) -> None:
+def test_a_campaign_tells_nothing_of_its_truth_and_the_package_reads_it(small):
     words = re.compile(r"effect|seed|true|noise|colou?r|white|p0|eta3|bias|class|index|key", re.IGNORECASE)
     assert sorted(each.name for each in small.iterdir()) == sorted(key_of(small)["campaigns"])
     assert {each.suffix for each in small.rglob("*") if each.is_file()} == {".toml", ".md", ".csv"}
@@ -105,7 +103,7 @@ def test_a_campaign_tells_nothing_of_its_truth_and_the_package_reads_it(small: P
             assert record.rest.size == 200
 
 
-def test_the_truth_is_away_from_the_edges_and_explains_the_records(small: Path) -> None:
+def test_the_truth_is_away_from_the_edges_and_explains_the_records(small):
     ranges = read_suite(SUITE).ranges
     for name, entry in key_of(small)["campaigns"].items():
         for parameter, (low, high) in ranges.items():
@@ -121,7 +119,7 @@ def test_the_truth_is_away_from_the_edges_and_explains_the_records(small: Path) 
             assert np.degrees(left) == pytest.approx(entry["noise"]["rms_deg_s"], rel=0.25)
 
 
-def test_what_effects_do_is_told_for_each_campaign(small: Path) -> None:
+def test_what_effects_do_is_told_for_each_campaign(small):
     for entry in key_of(small)["campaigns"].values():
         if entry["class"] == "single":
             fit = entry["declared_fit"]
@@ -134,13 +132,13 @@ def test_what_effects_do_is_told_for_each_campaign(small: Path) -> None:
 
 
 @pytest.mark.parametrize("name", KNOWN)
-def test_lanes_agree_with_the_stand(name: str) -> None:
+def test_lanes_agree_with_the_stand(name):
     pairs = [(Arm(), KNOWN[name]), (Arm(3.2e6, 0.9, 0.6, 1.2), KNOWN[name])]
     for found, (arm, manoeuvre) in zip(declared_speeds(pairs, 1001), pairs):
         assert np.abs(found - simulate(Motion(arm, manoeuvre), 1.0, 1e-9).gyro).max() < 5e-4
 
 
-def test_the_fit_finds_an_arm_that_lacks_nothing() -> None:
+def test_the_fit_finds_an_arm_that_lacks_nothing():
     truth = Arm(3.2e6, 0.9, 0.6, 1.2)
     strokes = [KNOWN[name] for name in ("lower", "raise", "empty")]
     speeds = declared_speeds([(truth, stroke) for stroke in strokes], 801)
@@ -159,6 +157,6 @@ REFUSED = [
 ]
 
 
-def test_refuses_with_one_sentence_and_writes_nothing(refuses: Any) -> None:
+def test_refuses_with_one_sentence_and_writes_nothing(refuses):
     for program, words, sentence in REFUSED:
         refuses(program, words, sentence)

@@ -30,7 +30,6 @@ def test_a_study_that_is_cut_short_has_seen_all_families_alike():
 
 def test_names_that_nobody_can_tell_apart_share_their_truth_and_versions_are_compared_on_it():
     truth = truth_of(ENTRY, hidden=False)
-    truth = truth_of(ENTRY, hidden=False)
     assert truth.exact
     assert truth.holds("output_lag")
     assert not truth.holds("drive_saturation")

@@ -12,7 +12,7 @@ from scipy.io import savemat
 
 from armid.errors import ArmidError
 from armid.record import read_campaign
-from commands import ended
+from commands import ended, refusing
 from measured.importers import import_dfki, import_emps, velocity_of
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -82,10 +82,8 @@ def test_velocity_has_no_phase_shift_and_the_stated_cutoff():
 def test_refused_variables(emps, tmp_path, name, change, fragments):
     kept = {key: value for key, value in {**variables(), **change}.items() if value is not None}
     savemat(emps / f"{name}.mat", kept)
-    with pytest.raises(ArmidError) as refusal:
+    with refusing(*fragments):
         import_emps(emps, tmp_path / "out")
-    for fragment in fragments:
-        assert fragment in str(refusal.value)
     assert not (tmp_path / "out").exists()
 
 
@@ -201,10 +199,8 @@ def test_refused_pendulum(dfki, tmp_path, change, holdout, fragments):
         write_dfki(dfki, "ddp", {k: v for k, v in columns(0.002).items() if k != "torque"})
     elif change:
         (dfki / "ddp_measured.csv").unlink()
-    with pytest.raises(ArmidError) as refusal:
+    with refusing(*fragments):
         import_dfki(dfki, tmp_path / "out", holdout)
-    for fragment in fragments:
-        assert fragment in str(refusal.value)
     assert not (tmp_path / "out").exists()
 
 

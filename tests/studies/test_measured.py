@@ -2,8 +2,6 @@
 
 import json
 import re
-import subprocess
-import sys
 
 import numpy as np
 import pandas as pd
@@ -12,6 +10,7 @@ import pytest
 from armid.contract.check import check_thing
 from armid.record import read_campaign
 from armid.registry import load_registry
+from commands import python
 
 
 @pytest.fixture
@@ -24,8 +23,7 @@ def call(folder):
     """Return a function that runs a program of the folder and returns exit code and what it said."""
 
     def run(program, *words):
-        done = subprocess.run([sys.executable, str(folder / program), *map(str, words)], capture_output=True, text=True,
-                              check=False)  # fmt: skip
+        done = python(folder / program, *words)
         return done.returncode, done.stdout + done.stderr
 
     return run

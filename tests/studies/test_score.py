@@ -2,7 +2,6 @@
 
 import json
 from pathlib import Path
-from typing import Any
 
 import pytest
 from made_up import entry, report
@@ -10,7 +9,7 @@ from made_up import entry, report
 from stand import RefusalError
 from stand.blind.campaign import key_path
 from stand.score.judge import judge, judge_all, read_json
-from stand.score.targets import Target, targets_of
+from stand.score.targets import targets_of
 
 ROOT = Path(__file__).parents[2]
 COULOMB = ("coulomb", (), True)
@@ -50,12 +49,12 @@ CANDIDATE = ("viscous", (), False)
     ("one_stroke", (), "explained", (COULOMB,), "false_alarm"),
     ("one_stroke", ("coulomb",), "cannot_tell_apart", (("viscous", ("coulomb",), False),), "group"),
 ])  # fmt: skip
-def test_one_word_for_each_report(label: str, truths: tuple[str, ...], verdict: str, steps: Any, word: str) -> None:
+def test_one_word_for_each_report(label, truths, verdict, steps, word):
     told = entry(label, *truths, listed=label != "unlisted")
     assert judge("c000", told, report(verdict, *steps))["judgement"] == word
 
 
-def test_a_wrong_name_with_a_group_is_not_alone_and_a_group_less_probable_than_a_claim_is_none() -> None:
+def test_a_wrong_name_with_a_group_is_not_alone_and_a_group_less_probable_than_a_claim_is_none():
     row = judge("c000", entry("single", "viscous"), report("cannot_tell_apart", PAIR))
     assert (row["wrong_alone"], row["wrong_group"], row["largest_group"], row["group_of_truth"]) == (False, True, 2, 0)
     row = judge("c000", entry("single", "viscous"), report("explained", COULOMB))
@@ -66,7 +65,7 @@ def test_a_wrong_name_with_a_group_is_not_alone_and_a_group_less_probable_than_a
         assert judge("c000", entry("single", "coulomb"), told)["judgement"] == word
 
 
-def test_errors_and_biases_are_reckoned_and_no_held_out_error_without_a_holdout() -> None:
+def test_errors_and_biases_are_reckoned_and_no_held_out_error_without_a_holdout():
     row = judge("c000", entry("single", "coulomb"), report("explained", COULOMB, after=0.006, bias=0.02))
     assert (row["before_over_floor"], row["after_over_floor"]) == pytest.approx((4.0, 1.2))
     assert row["cut"] == pytest.approx(0.7)
@@ -79,12 +78,12 @@ def test_errors_and_biases_are_reckoned_and_no_held_out_error_without_a_holdout(
     assert row["before"] is row["after_over_floor"] is row["cut"] is None
 
 
-def found(rows: list[dict[str, Any]], words: str) -> Target:
+def found(rows, words):
     (target,) = (each for each in targets_of(rows, 0) if each.question.endswith(words))
     return target
 
 
-def test_the_targets_count_what_they_say_or_nothing_and_one_stroke_may_not_be_trusted() -> None:
+def test_the_targets_count_what_they_say_or_nothing_and_one_stroke_may_not_be_trusted():
     right, wrong = (report("explained", step) for step in (COULOMB, TILT))
     rows = [judge("c", entry("single", "coulomb"), right) for _ in range(19)]
     held = "20 %: right name, or a group that holds it"
@@ -104,7 +103,7 @@ def test_the_targets_count_what_they_say_or_nothing_and_one_stroke_may_not_be_tr
 
 
 @pytest.fixture
-def suite(tmp_path: Path) -> Path:
+def suite(tmp_path):
     folder = tmp_path / "suite"
     key = {"campaigns": {"c000": entry("control"), "c001": entry("single", "coulomb")}}
     key_path(folder).write_text(json.dumps(key))
@@ -113,13 +112,13 @@ def suite(tmp_path: Path) -> Path:
     return folder
 
 
-def scored(suite: Path) -> tuple[list[Any], list[Any]]:
+def scored(suite):
     key = read_json(key_path(suite))["campaigns"]
     files = {name: suite.with_name("results") / name / "report.json" for name in key}
     return judge_all(key, {name: read_json(file) for name, file in files.items() if file.is_file()})
 
 
-def test_a_campaign_without_a_report_is_missing(suite: Path) -> None:
+def test_a_campaign_without_a_report_is_missing(suite):
     rows, missing = scored(suite)
     assert ([row["judgement"] for row in rows], [row["judgement"] for row in missing]) == (["right"], ["missing"])
     first = targets_of(rows, len(missing))[0]
@@ -129,7 +128,7 @@ def test_a_campaign_without_a_report_is_missing(suite: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "sentence"), [("{", "is not JSON"), ("{}", "is not a report of a closed loop"), ("[]", "is not a report")]
 )
-def test_refuses_what_is_no_report(text: str, sentence: str, suite: Path) -> None:
+def test_refuses_what_is_no_report(text, sentence, suite):
     (suite.with_name("results") / "c001" / "report.json").write_text(text)
     with pytest.raises(RefusalError, match=sentence):
         scored(suite)
@@ -137,7 +136,7 @@ def test_refuses_what_is_no_report(text: str, sentence: str, suite: Path) -> Non
         read_json(suite / "nothing.json")
 
 
-def test_nothing_in_the_package_names_a_key() -> None:
+def test_nothing_in_the_package_names_a_key():
     files = list((ROOT / "src").rglob("*.py"))
     assert len(files) > 50
     assert not [file for file in files if "key.json" in file.read_text()]

@@ -8,19 +8,19 @@ import pytest
 
 from stand.arm import KNOWN, Arm
 from stand.effects import Effects, flux, friction, relative_friction, unlisted_torque, worm_efficiency
-from stand.motion import Motion, Trajectory, simulate
+from stand.motion import Motion, simulate
 
 ARM = Arm()
 LEVER = ARM.piston_lever
 
 
 @cache
-def moved(effects: Effects, name: str = "lower", duration_s: float = 0.9) -> Trajectory:
+def moved(effects, name="lower", duration_s=0.9):
     # with 1e-9 single samples of a stiff drive are off by 2e-5, on some processors
     return simulate(Motion(ARM, KNOWN[name], effects), duration_s, 1e-10)
 
 
-def states(count: int = 200) -> list[dict[str, float]]:
+def states(count=200):
     rng = np.random.default_rng(5)
     low, high = (-0.9, -3.0, -70.0), (0.7, 3.0, 70.0)
     return [dict(zip(("angle", "speed", "current"), map(float, rng.uniform(low, high)))) for _ in range(count)]
@@ -42,11 +42,11 @@ def states(count: int = 200) -> list[dict[str, float]]:
     ({"drive_compliance": 5e-11, "drive_damping": 3e5}, {}),
 ], ids=lambda told: next(iter(told), "declared"))  # fmt: skip
 @pytest.mark.slow
-def test_two_ways_to_say_the_same_agree(one: dict[str, float], other: dict[str, float], name: str) -> None:
+def test_two_ways_to_say_the_same_agree(one, other, name):
     assert np.abs(moved(Effects(**one), name).gyro - moved(Effects(**other), name).gyro).max() < 1e-5
 
 
-def test_friction_takes_energy_out_at_any_state() -> None:
+def test_friction_takes_energy_out_at_any_state():
     named = ({"coulomb": 40.0, "coulomb_tanh": 1.0}, {"stribeck": 40.0, "stribeck_exponent": 1.0},
              {"seal_friction": 300.0}, {"asymmetric_friction": 40.0})  # fmt: skip
     for sizes in named:
@@ -56,7 +56,7 @@ def test_friction_takes_energy_out_at_any_state() -> None:
         assert all(unlisted_torque(ARM, effects, now, -0.8, 400.0) * now["speed"] <= 0.0 for now in states()), sizes
 
 
-def test_friction_of_either_direction_a_taut_cable_and_what_depends_on_time_by_hand() -> None:
+def test_friction_of_either_direction_a_taut_cable_and_what_depends_on_time_by_hand():
     effects = Effects(asymmetric_friction=40.0, asymmetric_share=0.25)
     down, up = (friction(ARM, effects, {"speed": speed}) for speed in (1.0, -1.0))
     assert (down, up) == pytest.approx((50.0, -30.0))
@@ -72,7 +72,7 @@ def test_friction_of_either_direction_a_taut_cable_and_what_depends_on_time_by_h
     assert unlisted_torque(ARM, ripple, now, 0.0, 0.0) == pytest.approx(expected)
 
 
-def test_the_root_saturates_at_its_current_and_a_fading_motor_loses_torque_with_the_charge() -> None:
+def test_the_root_saturates_at_its_current_and_a_fading_motor_loses_torque_with_the_charge():
     root = Effects(flux_root=100.0)
     assert flux(ARM, root, {"current": -100.0}) == pytest.approx(ARM.excitation * 100.0 / math.sqrt(2.0))
     assert flux(ARM, root, {"current": 1e7}) == pytest.approx(ARM.excitation * 100.0, rel=1e-4)
@@ -83,7 +83,7 @@ def test_the_root_saturates_at_its_current_and_a_fading_motor_loses_torque_with_
     assert passed["charge"][-1] == pytest.approx(np.trapezoid(np.abs(passed["current"]), dx=1e-3), rel=1e-3)
 
 
-def test_a_self_locking_worm_passes_nothing_back_and_one_rubs_less_the_faster_it_slides() -> None:
+def test_a_self_locking_worm_passes_nothing_back_and_one_rubs_less_the_faster_it_slides():
     # braking, it has the efficiency of the other direction
     for speed, current, expected in ((1.0, 9.0, 0.55), (-1.0, -9.0, 0.55), (1.0, -9.0, 2.0 - 1.0 / 0.55)):
         now = {"angle": 0.0, "speed": speed, "current": current}
@@ -95,7 +95,7 @@ def test_a_self_locking_worm_passes_nothing_back_and_one_rubs_less_the_faster_it
     assert relative_friction(-1.0) == found[3] == pytest.approx(0.4, abs=0.15)
 
 
-def test_play_in_the_tray_lets_the_shell_lag_and_a_stiff_base_tilts_by_its_compliance() -> None:
+def test_play_in_the_tray_lets_the_shell_lag_and_a_stiff_base_tilts_by_its_compliance():
     tight, loose = (moved(Effects(rocking_hz=12.0, rocking_play=play)).states for play in (0.0, 0.004))
     stretch = [np.abs(states["shell_angle"] - states["angle"]).max() for states in (tight, loose)]
     assert stretch[1] > stretch[0] + 0.003

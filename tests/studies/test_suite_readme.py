@@ -3,12 +3,11 @@
 import json
 import os
 import re
-import subprocess
-import sys
 
 import pytest
 
 from armid.study.tasks import read_study
+from commands import python
 
 # Letters of the notebook after a run, and as it is committed, its figures with few colours.
 MOST_LETTERS, MOST_COMMITTED = 1_000_000, 150_000
@@ -32,7 +31,7 @@ def test_the_guide_has_an_example_of_every_library_in_about_ten_lines(blocks):
 def test_examples_run(package, blocks, tmp_path):
     pytest.importorskip(package)
     (found,) = [b for b in blocks if re.search(rf"import.*\b{package}\b|from {package}\b", b) and "armid" in b]
-    done = subprocess.run([sys.executable, "-c", found], cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = python("-c", found, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip()
 
@@ -44,8 +43,8 @@ def test_a_foreign_optimiser_is_compared_by_one_command(blocks, root, tmp_path):
     study = (root / "studies" / "suite" / "yours.toml").read_text(encoding="utf-8")
     short = re.sub(r"problems = .*", 'problems = ["arm", "arm_shape"]', study).replace("[10, 100]", "[10]")
     (tmp_path / "yours.toml").write_text(short, encoding="utf-8")
-    command = [sys.executable, "-m", "armid", "study", "yours.toml", "--plugin", "mine.py:mine", "--out", "out"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    words = ("study", "yours.toml", "--plugin", "mine.py:mine", "--out", "out")
+    done = python("-m", "armid", *words, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "The paper's swarm (pso) is number" in done.stdout
     assert "mine" in done.stdout

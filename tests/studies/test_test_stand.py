@@ -1,15 +1,13 @@
 """The campaigns of the test stand: format, reproducibility, independence and refusals."""
 
 import shlex
-import subprocess
-import sys
 import tomllib
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
+from commands import python
 from stand import RefusalError
 from stand.command import main
 from stand.effects import read_effects
@@ -20,27 +18,27 @@ CAMPAIGNS = STAND / "campaigns"
 QUICK = ["--manoeuvres", "short,empty", "--repeats", "2", "--duration", "0.2"]
 
 
-def told(folder: Path) -> dict[str, Any]:
+def told(folder):
     return tomllib.loads((folder / "campaign.toml").read_text())
 
 
-def speeds(file: Path) -> Any:
+def speeds(file):
     return np.loadtxt(file, delimiter=",", skiprows=1)
 
 
 @pytest.fixture(scope="module")
-def quick(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def quick(tmp_path_factory):
     folder = tmp_path_factory.mktemp("stand") / "quick"
     assert main([str(folder), *QUICK, "--seed", "3", "--window-s", "0", "0.15", "--effect", "coulomb=30"]) == 0
     return folder
 
 
-def test_plotting_is_imported_only_to_plot() -> None:
+def test_plotting_is_imported_only_to_plot():
     code = "import sys, stand.command; sys.exit('matplotlib' in sys.modules or 'armid' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code], cwd=STAND, check=False).returncode == 0
+    assert python("-c", code, cwd=STAND).returncode == 0
 
 
-def test_a_campaign_is_written_in_the_fixed_format(quick: Path) -> None:
+def test_a_campaign_is_written_in_the_fixed_format(quick):
     assert {each.name for each in quick.iterdir()} == {
         "campaign.toml", "README.md", "short.csv", "short_2.csv", "empty.csv"
     }  # fmt: skip
@@ -68,7 +66,7 @@ def test_a_campaign_says_synthetic_and_the_command_that_makes_it_again(quick, tm
         assert (tmp_path / "quick" / file.name).read_text() == file.read_text()
 
 
-def test_a_manoeuvre_can_be_written_out(tmp_path: Path) -> None:
+def test_a_manoeuvre_can_be_written_out(tmp_path):
     options = ["--repeats", "1", "--duration", "0.05", "--holdout", "short"]
     assert main([str(tmp_path / "c"), "--manoeuvres", "up=20:-30.5:empty:24,short", *options]) == 0
     record = told(tmp_path / "c")["records"][0]
@@ -76,7 +74,7 @@ def test_a_manoeuvre_can_be_written_out(tmp_path: Path) -> None:
     assert (record["file"], record["role"], record["shell"]) == ("up.csv", "train", False)
 
 
-REFUSED: list[tuple[list[str], str]] = [
+REFUSED = [
     ([], "required: OUT_FOLDER"),
     (["out", "--p0", "much"], "invalid float"),
     (["out", "--eta3", "1.2"], "cannot exceed 1"),
@@ -103,7 +101,7 @@ EFFECTS_REFUSED = [
 ]
 
 
-def test_refuses_with_one_sentence_and_writes_nothing_also_effects_that_mean_nothing(refuses: Any) -> None:
+def test_refuses_with_one_sentence_and_writes_nothing_also_effects_that_mean_nothing(refuses):
     for words, sentence in REFUSED:
         refuses(main, words, sentence)
     for words, sentence in EFFECTS_REFUSED:
@@ -111,7 +109,7 @@ def test_refuses_with_one_sentence_and_writes_nothing_also_effects_that_mean_not
             read_effects(words)
 
 
-def test_force_replaces_a_campaign_whole(tmp_path: Path) -> None:
+def test_force_replaces_a_campaign_whole(tmp_path):
     folder = tmp_path / "c"
     assert main([str(folder), *QUICK]) == 0
     assert main([str(folder), *QUICK]) == 2
@@ -125,7 +123,7 @@ STORIES = {"paper_arm": 0.1 + 1e-9, "one_stroke": 2e-4, "four_strokes": 2e-4, "r
 
 
 @pytest.mark.parametrize("name", [n if n == "paper_arm" else pytest.param(n, marks=pytest.mark.slow) for n in STORIES])
-def test_a_committed_campaign_can_be_made_again(name: str, tmp_path: Path, monkeypatch: Any) -> None:
+def test_a_committed_campaign_can_be_made_again(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     there, again = CAMPAIGNS / name, tmp_path / "studies" / "campaigns" / name
     line = next(line for line in (there / "README.md").read_text().splitlines() if line.startswith("python "))
@@ -140,7 +138,7 @@ def test_a_committed_campaign_can_be_made_again(name: str, tmp_path: Path, monke
             assert (again / file.name).read_text() == file.read_text()
 
 
-def test_committed_campaigns_are_small_and_say_their_truth() -> None:
+def test_committed_campaigns_are_small_and_say_their_truth():
     for name in STORIES:
         assert sum(file.stat().st_size for file in (CAMPAIGNS / name).iterdir()) < 500_000
         said = (CAMPAIGNS / name / "README.md").read_text()

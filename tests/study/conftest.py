@@ -4,21 +4,18 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
-from pathlib import Path
 
 import pytest
 from small_study import PLUGINS, STUDY
 
-from armid.study.results import StudyResults
 from armid.study.runner import run_study
 
 
 @pytest.fixture
-def write_study(tmp_path: Path) -> Callable[..., Path]:
+def write_study(tmp_path):
     """Return a function that writes the small study; identifiers: TOML in place of its own."""
 
-    def write(seeds: int = 2, more: str = "", change: tuple[str, str] = ("", ""), name: str = "small.toml") -> Path:
+    def write(seeds=2, more="", change=("", ""), name="small.toml"):
         file = tmp_path / name
         text = STUDY.format(seeds=seeds, more=more)
         assert change[0] in text
@@ -29,7 +26,7 @@ def write_study(tmp_path: Path) -> Callable[..., Path]:
 
 
 @pytest.fixture(scope="session")
-def bad_identifiers(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def bad_identifiers(tmp_path_factory):
     """A file of identifiers that misbehave."""
     file = tmp_path_factory.mktemp("plugins") / "bad_identifiers.py"
     file.write_text(PLUGINS, encoding="utf-8")
@@ -37,11 +34,11 @@ def bad_identifiers(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def start(tmp_path: Path) -> Iterator[Callable[..., "subprocess.Popen[str]"]]:
+def start(tmp_path):
     """Return a function that starts `armid study` in a process of its own."""
     started = []
 
-    def popen(*arguments: object, **options: object) -> "subprocess.Popen[str]":
+    def popen(*arguments, **options):
         command = [sys.executable, "-m", "armid", "study", *map(str, arguments)]
         told = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True, "env": os.environ}
         # a child goes on ignoring what is ignored, as it is where a shell started the tests in the background
@@ -61,7 +58,7 @@ def start(tmp_path: Path) -> Iterator[Callable[..., "subprocess.Popen[str]"]]:
 
 
 @pytest.fixture(scope="session")
-def undisturbed(tmp_path_factory: pytest.TempPathFactory) -> StudyResults:
+def undisturbed(tmp_path_factory):
     """The small study with six seeds, run by one process that nobody disturbed."""
     folder = tmp_path_factory.mktemp("undisturbed")
     (folder / "small.toml").write_text(STUDY.format(seeds=6, more=""), encoding="utf-8")

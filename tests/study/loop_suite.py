@@ -1,7 +1,5 @@
 """A blind suite of three campaigns, and a study that closes the loop on them with few candidates."""
 
-from pathlib import Path
-
 from input_texts import SUITE_HEAD
 
 SUITE = (
@@ -27,7 +25,7 @@ candidates = ["coulomb", "seal_friction", "supply_sag", "tilt", "viscous"]
 """
 
 
-def fake_campaigns(folder: Path, *names: str) -> None:
+def fake_campaigns(folder, *names):
     """Write folders that look like campaigns to who does not read them."""
     for name in names:
         (folder / name).mkdir(parents=True)

@@ -2,8 +2,6 @@
 
 import re
 
-from armid.study.results import StudyResults
-
 # What a runner says beside its output before it opens anything, and where nothing was compiled before.
 COST = re.compile(
     r"(?:small: [\d,]+ runs, .+; what is finished already is kept\n|armid: (?:compiling|planning|reading) .+\n)+"
@@ -115,7 +113,7 @@ def segfaults_when_built(budget):
 NOT_COMPARED = ["seconds", "started_at"]
 
 
-def same_results(one: StudyResults, two: StudyResults) -> bool:
+def same_results(one, two):
     """Tell whether two stores hold the same runs, parameters and traces, bit for bit."""
     assert one.runs["error"].tolist() == two.runs["error"].tolist()
     runs = one.runs.drop(columns=NOT_COMPARED).equals(two.runs.drop(columns=NOT_COMPARED))
@@ -123,7 +121,7 @@ def same_results(one: StudyResults, two: StudyResults) -> bool:
     return runs and parameters and traces
 
 
-def beside_cost(err: str) -> str:
+def beside_cost(err):
     """Return what a runner writes to its error stream behind the cost of the study."""
     told = COST.match(err)
     assert told, err

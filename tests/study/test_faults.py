@@ -14,6 +14,7 @@ from armid.study.results import load_study
 from armid.study.runner import run_study
 from armid.study.store import FILE_NAME, MissingRun
 from armid.study.tasks import Study, perform
+from commands import python, remount
 
 SEEDS = 6
 READER = """
@@ -69,26 +70,23 @@ def test_a_full_disk_is_told_and_harms_nothing(start, write_study, tmp_path, sma
     assert "database or disk is full; what was finished before is kept" in err
     kept = load_study(out)
     assert 0 < len(kept.runs) < SEEDS * RUNS_A_SEED
-    subprocess.run(["mount", "-o", "remount,size=20m", str(small_disk)], check=True)
+    remount(small_disk, "size=20m")
     assert start(file, "--out", out, "--jobs", 1).wait() == 0
     assert same_results(load_study(out), undisturbed)
 
 
 def test_a_read_only_folder_can_be_read_and_is_told_when_written(write_study, small_disk, undisturbed):
-    subprocess.run(["mount", "-o", "remount,size=20m", str(small_disk)], check=True)
+    remount(small_disk, "size=20m")
     shutil.copytree(undisturbed.path.parent, small_disk / "out")
-    subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
-    try:
-        assert same_results(load_study(small_disk / "out"), undisturbed)
-        with pytest.raises(ArmidError, match=rf"{FILE_NAME}.*attempt to write a readonly database"):
-            run_study(write_study(7), jobs=1, out=small_disk / "out")
-    finally:
-        subprocess.run(["mount", "-o", "remount,rw", str(small_disk)], check=True)
+    remount(small_disk, "ro")
+    assert same_results(load_study(small_disk / "out"), undisturbed)
+    with pytest.raises(ArmidError, match=rf"{FILE_NAME}.*attempt to write a readonly database"):
+        run_study(write_study(7), jobs=1, out=small_disk / "out")
 
 
 @pytest.mark.slow
 def test_a_log_left_in_a_read_only_folder_is_read(write_study, small_disk):
-    subprocess.run(["mount", "-o", "remount,size=20m", str(small_disk)], check=True)
+    remount(small_disk, "size=20m")
     out = small_disk / "out"
     run_study(write_study(1), jobs=1, out=out, only="row 1/random")
     # Who has the store open when the runner ends, and is killed then, leaves the log behind.
@@ -99,11 +97,8 @@ def test_a_log_left_in_a_read_only_folder_is_read(write_study, small_disk):
     reader.communicate()
     n = len(load_study(out).runs)
     assert any(p.name.endswith("-wal") for p in out.iterdir())
-    subprocess.run(["mount", "-o", "remount,ro", str(small_disk)], check=True)
-    try:
-        assert len(load_study(out).runs) == n > 0
-    finally:
-        subprocess.run(["mount", "-o", "remount,rw", str(small_disk)], check=True)
+    remount(small_disk, "ro")
+    assert len(load_study(out).runs) == n > 0
 
 
 @pytest.mark.slow
@@ -115,11 +110,11 @@ def test_identifiers_that_misbehave_fail_alone(write_study, tmp_path, bad_identi
         "segfaults": "the worker process ended by SIGSEGV, 2 times",
         "interrupts": "the worker process ended with code 130, 2 times",
         "writes": "the worker process sent what is not a message of ours",
-        "hangs": "stopped at the time limit of 5 s",
+        "hangs": "stopped at the time limit of 3 s",
     }
     bad = "\n[[identifiers]]\n".join(f'name = "{name}"\nnoise_deg_s = 0.3' for name in errors)
     plugins = [f"{bad_identifiers}:{name}" for name in errors]
-    options = {"jobs": 2, "out": tmp_path / "out", "plugins": plugins, "only": "row 1", "time_limit": 5.0}
+    options = {"jobs": 2, "out": tmp_path / "out", "plugins": plugins, "only": "row 1", "time_limit": 3.0}
     found = run_study(write_study(1, change=(CHAIN, bad)), **options)
     failed = found.runs[found.runs["status"] == "failed"].set_index("identifier")["error"]
     assert {name: words for name, words in errors.items() if words in failed[name]} == errors
@@ -132,14 +127,14 @@ def test_identifiers_that_misbehave_fail_alone(write_study, tmp_path, bad_identi
 
 
 @pytest.mark.parametrize(("name", "words"), [
-    pytest.param("hangs", "stopped at the time limit of 4 s", marks=pytest.mark.slow),
+    pytest.param("hangs", "stopped at the time limit of 2 s", marks=pytest.mark.slow),
     ("raises", "ZeroDivisionError: division by zero"),
     ("segfaults", "the worker process ended by SIGSEGV, 2 times"),
 ])  # fmt: skip
 def test_what_a_factory_does_harms_no_runner(write_study, tmp_path, bad_identifiers, name, words):
     file = write_study(1, change=(CHAIN, f'name = "{name}_when_built"'))
     with pytest.raises(ArmidError, match=rf"identifier '{name}_when_built': it cannot be built: .*{words}"):
-        run_study(file, 1, out=tmp_path / "out", plugins=[f"{bad_identifiers}:{name}_when_built"], time_limit=4.0)
+        run_study(file, 1, out=tmp_path / "out", plugins=[f"{bad_identifiers}:{name}_when_built"], time_limit=2.0)
     assert not (tmp_path / "out").exists()
 
 
@@ -203,5 +198,5 @@ def test_a_script_without_a_main_guard_runs_a_study(write_study, tmp_path):
     script = tmp_path / "script.py"
     called = f"run_study({str(write_study(1))!r}, 1, out={str(tmp_path / 'out')!r}, only='row 1/random')"
     script.write_text(f"import armid\nprint(len(armid.{called}.runs))\n", encoding="utf-8")
-    done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True)
+    done = python(script)
     assert (done.stdout, done.stderr) == ("2\n", "")

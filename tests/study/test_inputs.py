@@ -11,6 +11,7 @@ from armid.study.inputs import SIGNALS, input_values
 from armid.study.results import load_study
 from armid.study.runner import run_study
 from armid.study.tasks import read_study
+from commands import refusing
 
 TIMES = 1e-3 * np.arange(4001)
 STUDY = """\
@@ -116,9 +117,8 @@ def test_what_is_no_input_is_refused_in_one_sentence(tmp_path, given, sentence):
     for name, end in (("drive.csv", 3.0), ("short.csv", 1.0)):
         pd.DataFrame({"time_s": [0.0, end], "force": [0.0, 1.0]}).to_csv(tmp_path / name, index=False)
     (tmp_path / "driven.toml").write_text(STUDY.format(input=given), encoding="utf-8")
-    with pytest.raises(ArmidError) as caught:
+    with refusing(sentence):
         read_study(tmp_path / "driven.toml")
-    assert sentence in str(caught.value)
 
 
 def test_an_input_that_is_missing_or_unknown_is_named(tmp_path):
@@ -126,6 +126,5 @@ def test_an_input_that_is_missing_or_unknown_is_named(tmp_path):
                              (f", inputs = {{ w = {INPUTS['prbs']} }}", "input 'w' is unknown, ")):  # fmt: skip
         text = STUDY.format(input="{}").replace(", inputs = { u = {} }", inputs)
         (tmp_path / "driven.toml").write_text(text, encoding="utf-8")
-        with pytest.raises(ArmidError) as caught:
+        with refusing(sentence):
             read_study(tmp_path / "driven.toml")
-        assert sentence in str(caught.value)

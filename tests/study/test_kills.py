@@ -72,7 +72,7 @@ def killed_again_and_again(start, file, out, moments, rng):
 @pytest.mark.slow
 def test_a_runner_killed_again_and_again(start, write_study, tmp_path, undisturbed):
     """After many kills nearly every run is finished, and none hits a runner at work."""
-    assert killed_again_and_again(start, write_study(SEEDS), tmp_path / "out", 4, random.Random(2)) >= 2
+    assert killed_again_and_again(start, write_study(SEEDS), tmp_path / "out", 3, random.Random(2)) >= 2
     assert same_results(load_study(tmp_path / "out"), undisturbed)
 
 

@@ -5,8 +5,6 @@ import os
 import shutil
 import signal
 import sqlite3
-import subprocess
-import sys
 import time
 from contextlib import closing
 from pathlib import Path
@@ -17,7 +15,7 @@ from loop_suite import STUDY, SUITE
 
 from armid.study.results import load_study
 from armid.study.runner import run_study
-from commands import ended
+from commands import ended, python
 
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parents[2]
@@ -31,7 +29,7 @@ def suite(tmp_path_factory):
     (folder / "blind.toml").write_text(STUDY, encoding="utf-8")
     words = ["blind", folder / "suite", "--seed", "3", "--suite", folder / "suite.toml", "--processes", "1"]
     # a program that shares no code with the package
-    subprocess.run([sys.executable, ROOT / "studies" / "test_stand.py", *words], check=True, capture_output=True)
+    assert python(ROOT / "studies" / "test_stand.py", *words).returncode == 0
     return folder
 
 
@@ -50,9 +48,8 @@ def test_every_report_is_kept_whole_and_the_score_of_store_and_exported_reports_
         assert set(report) >= {"verdict", "error", "parameters", "steps", "advice"}
     assert ended("export", "reports", suite / "out", tmp_path / "reports") == 0
     for results in (suite / "out", tmp_path / "reports"):
-        program = [sys.executable, str(ROOT / "studies" / "blind" / "score.py"), str(results)]
-        words = ["--key", str(suite / "suite.key.json"), "--out", str(tmp_path / "score")]
-        said = subprocess.run([*program, *words], check=True, capture_output=True, text=True).stdout
+        words = ("--key", suite / "suite.key.json", "--out", tmp_path / "score")
+        said = python(ROOT / "studies" / "blind" / "score.py", results, *words).stdout
         assert "Complete: 3 of 3 campaigns" in said
         assert ("closing one campaign, median" in said) == (results == suite / "out")
         assert set(pd.read_csv(tmp_path / "score" / "campaigns.csv")["judgement"]) == {"right"}
