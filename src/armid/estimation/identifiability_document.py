@@ -7,8 +7,8 @@ import numpy as np
 
 from armid.estimation.design import Offer, identity
 from armid.estimation.examine import Examination, Group, collinearity_index
-from armid.estimation.figures import PAIRS, pairs_of
 from armid.estimation.identify import versions_of
+from armid.estimation.identify_document import PAIRS, pairs_of
 from armid.estimation.information import PROFILE_RISE, Profile, normalised, sensitivities
 from armid.estimation.noise_model import Level, level_weights
 from armid.model import Array
