@@ -37,11 +37,11 @@ from armid.report.document import (
     points,
     record_axes,
     records_note,
-    remark_parts,
     rmse_text,
     small_axes,
     stored_figures,
     table,
+    titled,
     value_text,
 )
 from armid.report.result import Parts
@@ -85,7 +85,8 @@ def identify_document(
     said = [text for text in details["remarks"] if text not in details["warnings"]]
     first = [text for text in details["known_first"] if text in said]
     correlated = correlation_tables(result["correlation"])
-    remarks = remark_parts(first, [text for text in said if text not in first])
+    rest = [text for text in said if text not in first]
+    remarks = titled({"What must be known": first, "For the record": rest})
     value = result["fitness_value"]
     search = [
         ("identifier", result["identifier"]),
@@ -95,13 +96,13 @@ def identify_document(
         ("engine's error [rad/s or m/s]",
          "not known" if result["engine_error"] is None else f"{result['engine_error']:.2g}"),
     ]  # fmt: skip
-    figures = stored_figures(FIGURES, svgs)
+    drawn = partial(stored_figures, FIGURES, svgs)
     sections = (
         Section("Parameters", (parameters,)),
         fit_section(details),
         *(Section(part.title, (part,)) for part in remarks),
-        Section("Errors", (errors, by_record, *correlated, *figures.get("pairs", ()))),
-        Section("Search", (table("How it went", ["what", "value"], search), *figures.get("convergence", ()))),
+        Section("Errors", (errors, by_record, *correlated, *drawn("pairs"))),
+        Section("Search", (table("How it went", ["what", "value"], search), *drawn("convergence"))),
         Section("Equations", (listing("The model that was identified", result["model"]),)),
         made_section(details.get("made_by", {}), result["versions"], again),
     )

@@ -320,14 +320,16 @@ def digits_of(value: float, low: float | None = None, high: float | None = None)
     return int(np.clip(wanted, USUAL_DIGITS, MOST_DIGITS))
 
 
-def stored_figures(titles: Mapping[str, tuple[str, str]], svgs: Mapping[str, str]) -> dict[str, tuple[Figure, ...]]:
-    """Return the figures of a page that are stored, by name. titles: name -> title and caption; svgs: name -> SVG."""
-    return {name: (Figure(name, *titles[name], svg=svg),) for name, svg in svgs.items()}
+def stored_figures(
+    titles: Mapping[str, tuple[str, str]], svgs: Mapping[str, str], *names: str
+) -> tuple[Figure, ...]:  # fmt: skip
+    """Return those of some figures that are stored. titles: name -> title and caption; svgs: name -> SVG."""
+    return tuple(Figure(name, *titles[name], svg=svgs[name]) for name in names if name in svgs)
 
 
-def remark_parts(first: Sequence[str], rest: Sequence[str]) -> tuple[Sentences, ...]:
-    ranked = (("What must be known", first), ("For the record", rest))
-    return tuple(Sentences(tuple(sentences), title) for title, sentences in ranked if sentences)
+def titled(sentences: Mapping[str, Sequence[str]]) -> tuple[Sentences, ...]:
+    """Return sentences under their titles, "" for none; a title without sentences is left out."""
+    return tuple(Sentences(tuple(said), title) for title, said in sentences.items() if said)
 
 
 def correlation_tables(correlation: Mapping[str, Mapping[str, float | None]]) -> tuple[Table, ...]:
