@@ -9,15 +9,7 @@ from linear_records import linear_records
 from scipy.optimize import lsq_linear
 
 from armid.errors import ArmidError
-from armid.estimation.least_squares import (
-    LeastSquaresProblem,
-    descend,
-    estimate,
-    fit,
-    refine,
-    side_by_side,
-    weighted_records,
-)
+from armid.estimation.least_squares import LeastSquaresProblem, descend, estimate, fit, refine, side_by_side
 from armid.problem.space import Space
 from changed_records import noisy
 
@@ -109,8 +101,7 @@ def test_a_fixed_parameter_stays_and_weights_count(lowering_replays, arm_space):
     np.testing.assert_allclose(estimate((good,), arm_space), TRUTH, rtol=1e-5)
     bad = good.measuring(1.02 * good.measured)
     space = arm_space.with_fixed("n", 1.4)
-    unevenly = weighted_records((good, bad), space, (1000.0, 1.0))
-    heavy = unevenly.values(fit(unevenly, unevenly.shares(TRUTH[:3])))
+    heavy = refine((good, bad), space, TRUTH[:3], weights=(1000.0, 1.0))
     even = refine((good, bad), space, TRUTH[:3])
     np.testing.assert_allclose(heavy, TRUTH[:3], rtol=1e-5)
     assert np.abs(even / TRUTH[:3] - 1.0).max() > 1e-3

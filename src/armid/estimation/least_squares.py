@@ -154,11 +154,17 @@ MOST_ROUNDS, SETTLED_CHI2 = 12, 1e-4
 N_SPREAD, N_STARTS = 512, 4
 
 
-def refine(replays: tuple[Replay, ...], space: Space, x0: Array) -> Array:
+def refine(
+    replays: tuple[Replay, ...],
+    space: Space,
+    x0: Array,
+    weights: Sequence[float] | None = None,
+    tolerance: float = 1e-9,
+) -> Array:
     """Return the candidate near x0 that minimises sum over records of weight^2 |measured - simulated|^2 in the box.
 
-    Levenberg-Marquardt, see `descend`; the weights are those of `weighted_records`. A step into a region that diverges
-    is shortened; an estimate that the box holds ends on the box exactly.
+    Levenberg-Marquardt, see `descend`. A step into a region that diverges is shortened; an estimate that the box holds
+    ends on the box exactly.
 
     Parameters
     ----------
@@ -166,6 +172,10 @@ def refine(replays: tuple[Replay, ...], space: Space, x0: Array) -> Array:
         The records, ready to be simulated, and the box.
     x0 : array, SI, (n_free,)
         Free parameters, moved into the box.
+    weights : (n_records,), 1/unit of the record
+        None: 1/noise rms, or 1 for all where a record has no noise.
+    tolerance : float
+        Relative fall of the sum of squares in one step at which to stop.
 
     Returns
     -------
@@ -178,18 +188,18 @@ def refine(replays: tuple[Replay, ...], space: Space, x0: Array) -> Array:
     """
     if not space.free.any():
         return np.empty(0)
-    records = weighted_records(replays, space)
-    return records.values(fit(records, records.shares(np.asarray(x0, dtype=np.float64))))
+    records = weighted_records(replays, space, weights)
+    return records.values(fit(records, records.shares(np.asarray(x0, dtype=np.float64)), tolerance))
 
 
-def estimate(replays: tuple[Replay, ...], space: Space) -> Array:
+def estimate(replays: tuple[Replay, ...], space: Space, weights: Sequence[float] | None = None) -> Array:
     """Return the least-squares estimate without a start: the best of fits from the best of candidates over the box.
 
     Deterministic: see `spread_starts`.
 
     Parameters
     ----------
-    replays, space
+    replays, space, weights
         See `refine`.
 
     Returns
@@ -204,7 +214,7 @@ def estimate(replays: tuple[Replay, ...], space: Space) -> Array:
     """
     if not space.free.any():
         return np.empty(0)
-    records = weighted_records(replays, space)
+    records = weighted_records(replays, space, weights)
     return records.values(descend(records, spread_starts(records), TOLERANCE, central=True))
 
 
