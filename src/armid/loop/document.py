@@ -531,10 +531,8 @@ def missing_sentences(missing: Missing) -> list[str]:
     curves = ", ".join(f"{d.variable}{TIMES_IN_WORDS[d.factor]} at {d.port} {d.share:.0%}" for d in ranked)
     if not curves:
         return [*said, "What the residual follows was not found: no curve predicts parts left out of its fit."]
-    return [
-        *said,
-        f"What the residual follows, with the share that a curve over it predicts on parts left out: {curves}.",
-    ]
+    shares = "What the residual follows, with the share that a curve over it predicts on parts left out"
+    return [*said, f"{shares}: {curves}."]
 
 
 def diagnosis_sentences(seen: Residuals) -> list[str]:

@@ -201,7 +201,7 @@ def check_empty(table: CsvTable, header: str, present: Mask) -> None:
     empty = np.flatnonzero(~present)
     if empty.size:
         fault = f"{header} has no number in {empty.size} of {present.size} rows, the first on line "
-        fault += str(table.line_of(int(empty[0])))
+        fault += str(table.lines[int(empty[0])])
         if empty.size > MOST_EMPTY * present.size:
             raise ArmidError(f"{table.file}: {fault}, at most half of the rows without one are expected")
         warn(table, f"{fault}: these are no data")
@@ -215,7 +215,7 @@ def check_number(table: CsvTable, header: str, rows: Mask, timing: Timing) -> No
 
 
 def lost(table: CsvTable, header: str, kind: str, at: NDArray[np.intp], times: Array) -> Broken:
-    line = table.line_of(int(at[0]))
+    line = table.lines[int(at[0])]
     if kind == "spikes":
         more = f", and {at.size - 1} more" if at.size > 1 else ""
         value = float(table.columns[header][at[0]])
@@ -256,14 +256,14 @@ def without_turns(table: CsvTable, header: str, raw: Array, unwrap: bool) -> Arr
     rows, change = np.flatnonzero(present)[1:], np.diff(raw[present])
     turns = np.rint(change / turn)
     if not unwrap:
-        line = table.line_of(int(rows[turns != 0.0][0]))
+        line = table.lines[int(rows[turns != 0.0][0])]
         warn(table, f"{header} wraps at {turn:.6g}, {int(np.sum(turns != 0.0))} times, the first on line {line}: "
                     "unwrap = true in campaign.toml takes the turns out")  # fmt: skip
         return raw
     # of a motion the steps change little from row to row, but where they pass half a turn
     fast = np.flatnonzero(np.abs(np.diff(change - turn * turns)) > 0.5 * turn)
     if fast.size:
-        line = table.line_of(int(rows[fast[0] + 1]))
+        line = table.lines[int(rows[fast[0] + 1])]
         raise ArmidError(f"{table.file}, line {line}: {header} moves by half a turn or more from row to row, so that "
                          "its turns cannot be counted: faster sampling is expected")  # fmt: skip
     unwrapped = raw.copy()
@@ -295,7 +295,7 @@ def check_range(measured: Sequence[tuple[Signal, Array]], range_deg_s: float, ta
     saturated = np.flatnonzero(in_runs(near, SATURATED_SAMPLES))
     if saturated.size:
         row = int(saturated[0])
-        raise ArmidError(f"{table.file}, line {table.line_of(row)}: {SATURATED_SAMPLES} samples in a row are at the "
+        raise ArmidError(f"{table.file}, line {table.lines[row]}: {SATURATED_SAMPLES} samples in a row are at the "
                          f"gyro range of {np.rad2deg(gyro_range):.6g} deg/s (saturated), a motion within it is "
                          "expected")  # fmt: skip
 

@@ -8,7 +8,7 @@ word nothing themselves; each escapes what comes from files.
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
-from difflib import SequenceMatcher
+from difflib import unified_diff
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Union, overload
 
@@ -240,13 +240,8 @@ def listing(title: str, text: str, folded: bool = False) -> Listing:
 def changed(before: str, after: str) -> tuple[Line, ...]:
     """Return the lines of two texts as one, marked where they differ."""
     old, new = before.splitlines(), after.splitlines()
-    lines: list[Line] = []
-    for what, i, j, k, m in SequenceMatcher(None, old, new, autojunk=False).get_opcodes():
-        if what == "equal":
-            lines += [Line(t) for t in old[i:j]]
-            continue
-        lines += [Line(t, "-") for t in old[i:j]] + [Line(t, "+") for t in new[k:m]]
-    return tuple(lines)
+    _, _, _, *lines = unified_diff(old, new, n=len(old), lineterm="")  # behind a heading of three lines
+    return tuple(Line(line[1:], line[0].strip()) for line in lines)
 
 
 def slug(*texts: str) -> str:
