@@ -117,11 +117,9 @@ def is_number(numba_type: Any) -> bool:
     return isinstance(numba_type, NUMBER_TYPES)
 
 
-def mixes_lanes(*numba_types: Any) -> bool:
-    """Tell whether the types are numbers and lanes, with lanes among them."""
-    return any(isinstance(t, Lanes) for t in numba_types) and all(
-        isinstance(t, Lanes) or is_number(t) for t in numba_types
-    )
+def mixes_lanes(*given: Any) -> bool:
+    """Tell whether numba types are numbers and lanes, with lanes among them."""
+    return any(isinstance(t, Lanes) for t in given) and all(isinstance(t, (Lanes, *NUMBER_TYPES)) for t in given)
 
 
 def broadcast(builder: Any, value: Any, width: int) -> Any:

@@ -295,9 +295,8 @@ def residual_section(details: Mapping[str, Any], errors: Table) -> Section:
         "see one model alone. Of long records the least and the largest sample of each short interval are drawn. "
     )
     gallery = Gallery(tuple(figures), "Measured minus simulated", "residuals")
-    return Section(
-        "Residual of each record", (gallery, errors), text + records_note(len(figures), details["n_records"])
-    )
+    note = records_note(len(figures), details["n_records"])
+    return Section("Residual of each record", (gallery, errors), text + note)
 
 
 def advice_table(advice: list[Mapping[str, Any]], words: list[str]) -> Table:
