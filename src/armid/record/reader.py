@@ -43,7 +43,7 @@ from armid.record.sensor import (
     sensor_of,
     wild_samples,
 )
-from armid.record.start import Track, n_spent, state_at, state_shown, track_of
+from armid.record.start import State, Track, n_spent, state_at, state_shown, track_of
 from armid.record.table import (
     LARGEST_CELL,
     POSITIONS,
@@ -320,6 +320,7 @@ def started(record: Record, plant: Plant, tracks: Mapping[str, Track], where: st
     spent = 0 if trained or not fitted or plant.records_one_speed else n_spent(length, manoeuvre.interval)
     pieces: list[Piece] = []
     for start in range(0, record.measured.size - length + 1, length):
+        state: State = {}, {}
         if plant.records_one_speed:
             state = state_at(tracks, start)
         elif fitted:
@@ -327,8 +328,6 @@ def started(record: Record, plant: Plant, tracks: Mapping[str, Track], where: st
             near = {name: replace(t, values=t.values[cut]) for name, t in tracks.items()}
             inputs = [u[start:] for u in manoeuvre.inputs.values()]
             state = state_shown(plant, manoeuvre.constants, near, manoeuvre.interval, 0 if spent else start, inputs)
-        else:
-            state = ({}, {})
         part, shown = manoeuvre.part(start, length, state[0]), state[0] if fitted and trained else {}
         pieces.append(Piece(part, slice(0, length), start, state[1], spent, shown))
     # the first piece starts where the record does
