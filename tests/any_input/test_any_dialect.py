@@ -109,7 +109,7 @@ def test_other_ways_to_write_a_file_are_read_with_one_sentence(content, words):
         assert word in said
     assert list(table.columns) == list(NAMES)
     np.testing.assert_array_equal(np.column_stack([*table.columns.values()]), ROWS)
-    assert table.line_of(1) > table.line_of(0) > 1
+    assert table.lines[1] > table.lines[0] > 1
 
 
 @pytest.mark.parametrize(("text", "words"), [

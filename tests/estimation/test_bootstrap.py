@@ -9,7 +9,7 @@ from armid.estimation import bootstrap as bootstraps
 from armid.estimation import identify as identifications
 from armid.estimation.bootstrap import Scatter, Task, bootstrap, refined
 from armid.estimation.identify import identify
-from armid.estimation.identify_document import answer, details_of, parameter_table, remarks, result_of
+from armid.estimation.identify_document import answer, details_of, parameter_table, result_of
 from armid.estimation.information import information_at
 from armid.estimation.noise_model import Level, coloured
 from armid.identifiers import IDENTIFIERS
@@ -137,7 +137,7 @@ def test_identify_gives_the_interval_of_its_fitness(lowering, arm, arm_space):
         assert (entries[name]["low"], entries[name]["high"]) == (found.scatter.low[i], found.scatter.high[i])
         assert entries[name]["bias"] == found.scatter.bias[i]
     assert any(text.startswith("The intervals come from") and "Bias of the estimate: p0" in text
-               for text in remarks(found))  # fmt: skip
+               for text in details_of(found)["remarks"])  # fmt: skip
     biased = replace(found, scatter=replace(found.scatter, bias=np.array([0.0, 0.0, 0.0, 1.0])))
     assert "biased by" in result_of(biased)["parameters"]["n"]["interval_doubt"]
 

@@ -9,7 +9,7 @@ from scipy.optimize import least_squares, lsq_linear
 from scipy.stats import chi2
 
 from armid.engine import Schedule
-from armid.estimation.identify_document import remarks
+from armid.estimation.identify_document import details_of
 from armid.estimation.information import (
     PROFILE_RISE,
     collinear,
@@ -92,7 +92,8 @@ def test_what_probes_elsewhere_lose_in_the_engine_hides_no_misfit(lowering_repla
     level = information_at((swinging.changed(calibrations=off),), arm_space, TRUTH).levels[0]
     assert level.from_residual
     coarse = tuple(r.changed(calibrations=off) for r in lowering_found.train_replays)
-    assert not any("the engine is off" in text for text in remarks(replace(lowering_found, train_replays=coarse)))
+    coarsely = replace(lowering_found, train_replays=coarse)
+    assert not any("the engine is off" in text for text in details_of(coarsely)["remarks"])
     # where the engine itself is off at the estimate, what it leaves is not misfit
     rough = tuple(replace(c, schedule=Schedule(1, refinement=1)) for c in replay.calibrations)
     wrong = with_noise(replay, 1e-9).changed(calibrations=rough)

@@ -9,9 +9,18 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from armid.estimation.figures import chosen, convergence_figure, figures_of, fit_figure, pairs_of
 from armid.estimation.identify import identify, record_errors
-from armid.estimation.identify_document import answer, details_of, identify_document, remarks, result_of
+from armid.estimation.identify_document import (
+    answer,
+    chosen,
+    convergence_figure,
+    details_of,
+    figures_of,
+    fit_figure,
+    identify_document,
+    pairs_of,
+    result_of,
+)
 from armid.identifiers import IDENTIFIERS
 from armid.problem.fitness import FITNESS
 from armid.problem.space import space_of
@@ -45,7 +54,7 @@ def test_numbers_are_si_and_remarks_name_bounds_pairs_divergence_and_noise(lower
         # joined over one record: its weight is multiplied in and divided out again
         assert {k: told_of_it[k] for k in numbers} == pytest.approx(numbers, rel=1e-12)
     at_its_bound = replace(lowering_found, candidate=lowering_found.space.low, n_failed=7)
-    said = "\n".join(remarks(at_its_bound))
+    said = "\n".join(details_of(at_its_bound)["remarks"])
     for name in ("p0", "k", "eta3", "n"):
         assert f"{name} sits on its bound" in said
     assert "7 of 160 candidates diverged and were given a penalty." in said
@@ -74,7 +83,7 @@ def test_what_is_not_known_is_null(lowering_found, capsys):
     assert "Not determined by these records: k." in text
     assert "│ not determined" in text
     assert "holdout: none" in text
-    assert "k is not determined by these records." in remarks(worse)
+    assert "k is not determined by these records." in details_of(worse)["remarks"]
     outputs = {name: replace(e, rmse=np.nan) for name, e in worse.train.outputs.items()}
     lost = replace(worse, train=replace(worse.train, rmse=np.nan, outputs=outputs))
     assert "Error (RMSE): not finite deg/s on the records fitted" in shown(lost)
@@ -98,7 +107,7 @@ def test_noise_a_lacking_model_an_unfinished_search_and_a_failed_holdout_are_tol
         (near, "least-squares minimum", False),
         (worse, "does not carry over", True), (alike, "does not carry over", False),
     ):  # fmt: skip
-        assert (words in "\n".join(remarks(replace(lowering_found, **changes)))) == is_told, words
+        assert (words in "\n".join(details_of(replace(lowering_found, **changes))["remarks"])) == is_told, words
 
 
 @pytest.mark.parametrize(("key", "noticed"), [("28.0", False), ("30.0", True)])

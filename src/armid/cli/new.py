@@ -23,8 +23,8 @@ from armid.errors import ArmidError, nearest, quoted
 from armid.model import Array, Plant
 from armid.model.effect import RESERVED_WORDS
 from armid.model.parameter import check_name
+from armid.record.reader import wraps_at
 from armid.record.sensor import FEWEST_REST_SAMPLES, sensor_of, stands_still
-from armid.record.signal import wraps_at
 from armid.record.table import CsvTable, missing, read_table
 from armid.registry import load_registry
 from armid.report.result import NewFiles

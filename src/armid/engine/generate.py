@@ -15,7 +15,7 @@ the neighbours do.
 import ast
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 from armid.engine.transpile import SourceText, local_name
@@ -111,7 +111,7 @@ class KernelParts:
             "new": listed(self.latches, "new_"), "given": listed(self.parameters + self.constants),
         }  # fmt: skip
         lists["judging"] = f"judged, {listed(self.states, 'per_')}"
-        names = {f.name: getattr(self, f.name) for f in fields(self)} | {"latch_names": self.latches}
+        names = vars(self) | {"latch_names": self.latches}
         remembered = list(dict.fromkeys(one.of for one in self.late_states))
         numbers = [str(i) for i in range(len(self.delays))]
         of_delays = [listed(numbers, f"{word}_") for word in ("late_by", "whole", "rest", "using")]

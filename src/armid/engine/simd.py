@@ -117,11 +117,9 @@ def is_number(numba_type: Any) -> bool:
     return isinstance(numba_type, NUMBER_TYPES)
 
 
-def mixes_lanes(*numba_types: Any) -> bool:
-    """Tell whether the types are numbers and lanes, with lanes among them."""
-    return any(isinstance(t, Lanes) for t in numba_types) and all(
-        isinstance(t, Lanes) or is_number(t) for t in numba_types
-    )
+def mixes_lanes(*given: Any) -> bool:
+    """Tell whether numba types are numbers and lanes, with lanes among them."""
+    return any(isinstance(t, Lanes) for t in given) and all(isinstance(t, (Lanes, *NUMBER_TYPES)) for t in given)
 
 
 def broadcast(builder: Any, value: Any, width: int) -> Any:
@@ -152,18 +150,19 @@ def vector_pointer(context: Any, builder: Any, signature: Any, arguments: Any, w
     return builder.bitcast(builder.gep(data, [i], source_etype=DOUBLE), vector_of(width).as_pointer())
 
 
-def elementwise(result: Any, compute: Callable[..., Any], *given: Any) -> tuple[Any, Callable[..., Any]]:
-    """Return signature and code of an intrinsic whose arguments all become lanes of one width.
-
-    result: numba type of what it returns; compute(builder, vectors...): its LLVM value; given: numba types.
-    """
-    width = lanes_of(*given).width
+def on_lanes(compute: Callable[..., Any]) -> Callable[..., Any]:
+    """Return code whose arguments all become lanes of one width; compute(builder, vectors...): its LLVM value."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        values = zip(arguments, signature.args, strict=True)
+        width, values = lanes_of(*signature.args).width, zip(arguments, signature.args, strict=True)
         return compute(builder, *(to_lanes(context, builder, v, t, width) for v, t in values))
 
-    return result(*given), generate
+    return generate
+
+
+def elementwise(result: Any, compute: Callable[..., Any], *given: Any) -> tuple[Any, Callable[..., Any]]:
+    """Return signature and code of an intrinsic on lanes; result, given: numba types of what it returns and takes."""
+    return result(*given), on_lanes(compute)
 
 
 def make_access(width: int) -> tuple[Any, Any]:
@@ -261,13 +260,8 @@ def define_operator(python_operator: Any, compute: Callable[..., Any]) -> None:
     def operator_type(context):
         return lambda a, b: lanes_of(a, b) if mixes_lanes(a, b) else None
 
-    def operate(context, builder, signature, arguments):
-        values = zip(arguments, signature.args, strict=True)
-        width = signature.return_type.width
-        return compute(builder, *(to_lanes(context, builder, v, t, width) for v, t in values))
-
     for pair in ((Lanes, Lanes), *((Lanes, n) for n in NUMBER_TYPES), *((n, Lanes) for n in NUMBER_TYPES)):
-        lower_builtin(python_operator, *pair)(operate)
+        lower_builtin(python_operator, *pair)(on_lanes(compute))
 
 
 def comparison(symbol: str) -> Callable[..., Any]:

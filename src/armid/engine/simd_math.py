@@ -224,29 +224,9 @@ def define_extreme(name: Any, implementation: Callable[..., Any], passes_nan: bo
         return lambda a, b: select(a != a, 0.5, b, implementation(a, b))
 
 
-@compiled
-def smaller(a, b):
-    return select(a, b, b, a)
-
-
-@compiled
-def larger(a, b):
-    return select(b, a, b, a)
-
-
-@compiled
-def both(a, b):
-    return select(a != 0.0, 0.5, b != 0.0, 0.0)
-
-
-@compiled
-def either(a, b):
-    return select(a != 0.0, 0.5, 1.0, b != 0.0)
-
-
-@compiled
-def with_sign(a, b):
-    return select(-b, 0.0, -abs(a), abs(a))
+smaller = compiled(lambda a, b: select(a, b, b, a))
+larger = compiled(lambda a, b: select(b, a, b, a))
+with_sign = compiled(lambda a, b: select(-b, 0.0, -abs(a), abs(a)))
 
 
 @compiled
@@ -302,8 +282,8 @@ define_extreme(np.minimum, smaller, passes_nan=True)
 define_extreme(np.maximum, larger, passes_nan=True)
 define_extreme(np.fmin, smaller, passes_nan=False)
 define_extreme(np.fmax, larger, passes_nan=False)
-define_binary((np.logical_and, operator.and_), both)
-define_binary((np.logical_or, operator.or_), either)
+define_binary((np.logical_and, operator.and_), compiled(lambda a, b: select(a != 0.0, 0.5, b != 0.0, 0.0)))
+define_binary((np.logical_or, operator.or_), compiled(lambda a, b: select(a != 0.0, 0.5, 1.0, b != 0.0)))
 define_binary((np.copysign, math.copysign), with_sign)
 define_binary((np.hypot, math.hypot), length)
 define_binary((np.arctan2, math.atan2), arctan2)

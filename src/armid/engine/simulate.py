@@ -210,16 +210,11 @@ def arranged(
     candidates: Array, width: int, weights: Array | None
 ) -> tuple[Array, NDArray[np.int64]]:  # fmt: skip
     """Return parameters as rows, one column for each lane, and the candidate of each lane (-1: padding)."""
-    n = len(candidates)
-    if n <= width:
-        weights = None  # within one group the order saves nothing
-    order = np.arange(n) if weights is None else np.argsort(candidates @ weights, kind="stable")
-    places = np.full(n + -n % width, -1)
-    places[:n] = order
-    rows = np.empty((candidates.shape[1], len(places)))
-    rows[:, :n] = candidates.T if weights is None else candidates[order].T
-    rows[:, n:] = rows[:, n - 1 : n]
-    return rows, places
+    n, padding = len(candidates), -len(candidates) % width
+    # within one group the order saves nothing
+    order = np.arange(n) if weights is None or n <= width else np.argsort(candidates @ weights, kind="stable")
+    lanes = np.append(order, np.repeat(order[-1:], padding))
+    return np.ascontiguousarray(candidates[lanes].T), np.append(order, np.full(padding, -1))
 
 
 @cache

@@ -5,6 +5,8 @@ import inspect
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial, reduce
+from itertools import pairwise
 from types import FunctionType, ModuleType
 from typing import Any
 
@@ -113,10 +115,7 @@ class Vectorise(ast.NodeTransformer):
             raise ArmidError(f"'{ast.unparse(node)}' joins numbers by `{name.removeprefix('logical_')}`: conditions "
                              "are expected, and `a if condition else b` for a choice")  # fmt: skip
         self.generic_visit(node)
-        result = node.values[0]
-        for value in node.values[1:]:
-            result = call(name, result, value)
-        return result
+        return reduce(partial(call, name), node.values)
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> ast.AST:
         self.generic_visit(node)
@@ -124,11 +123,9 @@ class Vectorise(ast.NodeTransformer):
 
     def visit_Compare(self, node: ast.Compare) -> ast.AST:
         self.generic_visit(node)
-        lefts = [node.left, *node.comparators[:-1]]
-        result: ast.expr = ast.Compare(lefts[0], node.ops[:1], node.comparators[:1])
-        for left, operator, right in zip(lefts[1:], node.ops[1:], node.comparators[1:], strict=True):
-            result = call("logical_and", result, ast.Compare(left, [operator], [right]))
-        return result
+        pairs = zip(pairwise([node.left, *node.comparators]), node.ops, strict=True)
+        each: list[ast.expr] = [ast.Compare(a, [operator], [b]) for (a, b), operator in pairs]
+        return reduce(partial(call, "logical_and"), each)
 
     def visit_BinOp(self, node: ast.BinOp) -> ast.AST:
         self.generic_visit(node)
@@ -152,10 +149,7 @@ class Vectorise(ast.NodeTransformer):
         self.generic_visit(node)
         if not (isinstance(node.func, ast.Name) and node.func.id in ("min", "max") and len(node.args) > 2):
             return node
-        result: ast.expr = node.args[0]
-        for value in node.args[1:]:
-            result = ast.Call(node.func, [result, value], [])
-        return result
+        return reduce(lambda first, second: ast.Call(node.func, [first, second], []), node.args)
 
 
 class Names(ast.NodeTransformer):

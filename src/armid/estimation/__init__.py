@@ -12,5 +12,5 @@ data_checks     signs, units, clocks and manoeuvres that look wrong, before anyt
 corrections     the mistakes that these look for, and what undoes each
 examine         all of these for one campaign; groups of parameters that move together
 
-What is shown of the results: figures, identify_document, identifiability_document.
+What is shown of the results: identify_document, identifiability_document.
 """

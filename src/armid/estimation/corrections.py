@@ -132,10 +132,8 @@ def corrections_of_zeros(plant: Plant, record: Record) -> Iterator[Correction]:
         for output in angles:
             yield Correction("zero", turn, f"{output} {more}", of_signals(plant, [output], lambda x, by=turn: [x + by]))
         if position is not None:
-            start = {"start_position": position + turn}
-            yield Correction(
-                "zero", turn, f"the angle {more}", of_pieces(partial(Piece.with_constants, constants=start))
-            )
+            other_start = partial(Piece.with_constants, constants={"start_position": position + turn})
+            yield Correction("zero", turn, f"the angle {more}", of_pieces(other_start))
 
 
 def corrections_of_keys(plant: Plant, record: Record) -> Iterator[Correction]:
@@ -217,9 +215,8 @@ def start_of(record: Record, piece: Piece, plant: Plant, factor: float) -> dict[
         return {}
     given = {n: v for n, v in old.items() if n not in piece.start_deviation}
     tracks = {one.output: Track(one.measured, one.noise.rms) for one in record.signals}
-    return state_shown(
-        plant, given, tracks, piece.manoeuvre.interval, piece.start_index, list(piece.manoeuvre.inputs.values())
-    )[0]
+    inputs = list(piece.manoeuvre.inputs.values())
+    return state_shown(plant, given, tracks, piece.manoeuvre.interval, piece.start_index, inputs)[0]
 
 
 def moved(record: Record, seconds: float) -> Record:

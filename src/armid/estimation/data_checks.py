@@ -235,9 +235,8 @@ def mistakes(trial: Trial, train: Sequence[Record]) -> tuple[list[DataIssue], Ar
     likely = sorted(tried, key=lambda t: t[1])[:N_LIKELY]
     starts = [z, *(t[0] for t in likely)]
     z, before = trial.fit_hard(train, starts)
-    issues = chosen(
-        "", before, [(own.fit_hard(undone, starts)[1], correction) for _, _, correction, own, undone in likely]
-    )
+    again = [(own.fit_hard(undone, starts)[1], correction) for _, _, correction, own, undone in likely]
+    issues = chosen("", before, again)
     if trial.errors(train, z).max() <= TOLERABLE or any(s.after <= TOLERABLE for s in issues):
         return issues, z
     everywhere, issues = issues, of_few(trial, train, before, below)
@@ -246,9 +245,8 @@ def mistakes(trial: Trial, train: Sequence[Record]) -> tuple[list[DataIssue], Ar
     z = agreed(trial, train, z)
     errors = trial.errors(train, z)[0]
     typical = typical_of(errors)
-    outside = [
-        train[i] for i in np.argsort(-errors)[:MOST_APART] if errors[i] > max(TOLERABLE, APART_IN_NOISE * typical)
-    ]
+    least = max(TOLERABLE, APART_IN_NOISE * typical)
+    outside = [train[i] for i in np.argsort(-errors)[:MOST_APART] if errors[i] > least]
     issues = exchanged(trial, train, outside, before) or [s for r in outside for s in apart(trial, r, z, typical)]
     if not issues and not everywhere and trial.model.plant.from_rest:
         # a driven machine drifts away from a model without friction

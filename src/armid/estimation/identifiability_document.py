@@ -1,14 +1,15 @@
 """The document of an examination, and what is stored of it: identifiability.json."""
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from armid.estimation.design import Offer, identity
 from armid.estimation.examine import Examination, Group, collinearity_index
-from armid.estimation.figures import PAIRS, pairs_of
 from armid.estimation.identify import versions_of
+from armid.estimation.identify_document import PAIRS, pairs_of
 from armid.estimation.information import PROFILE_RISE, Profile, normalised, sensitivities
 from armid.estimation.noise_model import Level, level_weights
 from armid.model import Array
@@ -21,9 +22,9 @@ from armid.report.document import (
     listed,
     made_section,
     plain,
-    remark_parts,
     stored_figures,
     table,
+    titled,
 )
 from armid.report.result import Parts
 from armid.report.style import GREY, OKABE_ITO, entitle, legend_below, look, panels
@@ -54,24 +55,25 @@ def identifiability_document(
 
     details: `made_by`, where it is known; for the others see `identify_document`.
     """
-    figures = stored_figures(FIGURES, svgs)
+    drawn = partial(stored_figures, FIGURES, svgs)
     answer, remarks = answer_and_remarks(result)
     parameters, offers = parameter_table(result), offer_table(result)
     noise = [text for text in result.get("for_the_record", ()) if text in remarks]
     correlated = correlation_tables(result["correlation"])
-    rest = remark_parts([text for text in remarks if text not in noise], noise)
-    sections: tuple[Section, ...] = (
-        Section("Parameters", (parameters, *figures.get("profiles", ()))),
+    first = [text for text in remarks if text not in noise]
+    rest = titled({"What must be known": first, "For the record": noise})
+    sections = (
+        Section("Parameters", (parameters, *drawn("profiles"))),
         *(Section(part.title, (part,)) for part in rest),
-        Section("What the records see", (*correlated, *figures.get("pairs", ()), *figures.get("sensitivities", ()))),
+        Section("What the records see", (*correlated, *drawn("pairs", "sensitivities"))),
         Section("The next record", (offers,)),
         made_section(details.get("made_by", {}), result["versions"], again),
     )
-    sections = tuple(s for s in sections if s.parts)
-    question = (
-        f"How well do these records pin down the parameters of {' + '.join([result['plant'], *result['effects']])}?"
-    )
-    return Document(result["campaign"], "Identifiability", question, answer, sections, main=(parameters, offers, *rest))
+    model = " + ".join([result["plant"], *result["effects"]])
+    return Document(
+        result["campaign"], "Identifiability", f"How well do these records pin down the parameters of {model}?",
+        answer, tuple(s for s in sections if s.parts), main=(parameters, offers, *rest),
+    )  # fmt: skip
 
 
 def answer_and_remarks(result: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -224,11 +224,8 @@ class Identification(Result):
         with angles_in(self.campaign.angle):
             scales = [scale_of(p.unit, p.value)[1] for p in parameters]
         # None becomes NaN
-        ends = {
-            "low": np.array([p.low for p in parameters], float),
-            "high": np.array([p.high for p in parameters], float),
-        }
-        return super().table.assign(**{end: values * scales for end, values in ends.items()})
+        ends = {end: np.array([getattr(p, end) for p in parameters], float) * scales for end in ("low", "high")}
+        return super().table.assign(**ends)
 
     @property
     def at_bound(self) -> NDArray[np.bool_]:
@@ -424,9 +421,7 @@ def output_errors(replays: Sequence[Replay], candidate: Array) -> Errors:
         rmse=float(np.sqrt(pooled([e.rmse**2 for e in errors], n))),
         nrmse=float(np.sqrt(pooled([e.nrmse**2 for e in errors], n))),
         chi2_per_sample=pooled(chi2, n) if len(chi2) == len(errors) else None,
-        s=pooled([e.s for e in errors], duration),
-        s1=pooled([e.s1 for e in errors], duration),
-        s2=pooled([e.s2 for e in errors], duration),
+        **{name: pooled([getattr(e, name) for e in errors], duration) for name in ("s", "s1", "s2")},
         unit=errors[0].unit,
         span=float(np.ptp(np.concatenate([r.measured for r in replays]))),
     )

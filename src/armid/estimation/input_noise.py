@@ -131,11 +131,12 @@ def pooled_noise(records: Sequence[Record]) -> dict[str, InputNoise]:
     for record in records:
         for name, noise in record.input_noise.items():
             seen.setdefault(name, []).append(noise)
-    known = {name: [n.rms for n in noises if n.rms > 0.0] for name, noises in seen.items()}
-    rms = {name: float(np.median(known[name])) if 2 * len(known[name]) >= len(noises) and known[name] else 0.0
-           for name, noises in seen.items()}  # fmt: skip
-    steps = {name: min((n.step for n in noises if n.step), default=0.0) for name, noises in seen.items()}
-    return {name: InputNoise(rms[name], steps[name]) for name in seen}
+    pooled = {}
+    for name, noises in seen.items():
+        known = [n.rms for n in noises if n.rms > 0.0]
+        rms = float(np.median(known)) if 2 * len(known) >= len(noises) else 0.0
+        pooled[name] = InputNoise(rms, min((n.step for n in noises if n.step), default=0.0))
+    return pooled
 
 
 def estimated(record: Record, noise: Mapping[str, InputNoise]) -> Record:

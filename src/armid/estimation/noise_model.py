@@ -158,10 +158,8 @@ def levels_left(
     that is noise alone, it shows how long the noise of a filtered sensor remembers, too; sharp errors of a model would
     look like memory. left: of each record, its unit, not whitened.
     """
-    parts = []
-    for replay, part in zip(replays, left, strict=True):
-        moved = changing(replay.measured)
-        parts.append(part[moved] if moved.sum() >= FEWEST_REST_SAMPLES else part)
+    moving = [changing(r.measured) for r in replays]
+    parts = [x[moved] if moved.sum() >= FEWEST_REST_SAMPLES else x for x, moved in zip(left, moving, strict=True)]
     records = [r.record for r in replays]
     steps = by_sensor(records, [r.signals[0].sensor.rounding for r in records])
     shown = {sensor: memory_and_sizes(several) for sensor, several in by_sensor(records, parts).items()}

@@ -62,6 +62,7 @@ from armid.report.document import (
     rmse_text,
     stored_figures,
     table,
+    titled,
     value_text,
 )
 from armid.report.result import Parts
@@ -125,12 +126,11 @@ def loop_document(
     if report.get("version") != REPORT_VERSION:
         raise ArmidError(f"report.json of {report['campaign']} was written by another version of armid: the same "
                          "`armid close-loop` again is expected")  # fmt: skip
-    figures = stored_figures(FIGURES, svgs)
-    unit = report["unit"]
+    unit, drawn = report["unit"], partial(stored_figures, FIGURES, svgs)
     both = [(which, model, report["error"][model][which]) for which in ("train", "holdout")
             for model in ("before", "after")]  # fmt: skip
     errors = error_table("Errors", ["records", "model"], [row for row in both if row[-1] is not None], unit, ERROR_NOTE)
-    parameters = parameter_table(report)
+    parameters, chances = parameter_table(report), probability_table(report)
     rows = [(r["record"], r["role"], model, r["error"][model]) for r in details["records"]
             for model in ("before", "after")]  # fmt: skip
     note = records_note(len(rows) // 2, details["n_records"])
@@ -139,39 +139,36 @@ def loop_document(
     steps += (Sentences((details["declared_by"],)),) if details.get("declared_by") else ()
     shifts = (*details["suspects"], *details["shifts"])
     together = tuple(f"{said[0].upper()}{said[1:]}." for said in report["known_together"])
-    beside = [Sentences((*shifts, *together))] if shifts or together else []
-    widths = [Sentences(width_sentences(report), "What makes the intervals wide")] if width_sentences(report) else []
     missing, words = tuple(details["missing"]), details["advice"]
     advice = tuple(advice_sentence(a, text) for a, text in zip(report["advice"][:1], words, strict=False))
     advice += tuple(report["next_steps"])
-    drawn_first = tuple(f for name in ("probabilities", "intervals") for f in figures.get(name, ()))
-    chances = probability_table(report)
-    sections = [
-        Section("What is missing", (chances, *drawn_first)),
+    tests = {f"{model.capitalize()}, {which} records": (details["diagnosis"][model] or {}).get(which)
+             for model in ("before", "after") for which in ("train", "holdout")}  # fmt: skip
+    sections = (
+        Section("What is missing", (chances, *drawn("probabilities", "intervals"))),
         Section("Error before and after", (errors,)),
+        Section("Motion", drawn("motion")),
         residual_section(details, by_record),
         Section("Steps", steps or (Text("No effect was added."),)),
-        Section("Parameters", (parameters, *widths, *beside, *figures.get("parameters", ()))),
-    ]
-    if "motion" in figures:
-        sections.insert(2, Section("Motion", figures["motion"]))
-    last = ("diagnosis", "against", "autocorrelation", "missing")
-    drawn = tuple(f for name in last for f in figures.get(name, ()))
-    titled = [(f"{model.capitalize()}, {which} records", (details["diagnosis"][model] or {}).get(which))
-              for model in ("before", "after") for which in ("train", "holdout")]  # fmt: skip
-    tests = [Sentences(tuple(sentences), title) for title, sentences in titled if sentences]
-    unnamed = [Sentences(missing, "What is missing, without a name")] if missing else []
-    sections.append(Section("Is what remains noise?", (*tests, *unnamed, *drawn)))
-    sections.append(Section("Models that were fitted", (log_table(report["log"]),)))
-    if advice:
-        tables = (advice_table(report["advice"], words),) if report["advice"] else ()
-        sections.append(Section("The next record", (Sentences(advice), *tables)))
-    sections.append(equations_section(details["equations"]))
-    sections.append(made_section(details.get("made_by", {}), details["versions"], again))
+        Section("Parameters", (
+            parameters, *titled({"What makes the intervals wide": width_sentences(report), "": (*shifts, *together)}),
+            *drawn("parameters"),
+        )),
+        Section("Is what remains noise?", (
+            *titled(tests | {"What is missing, without a name": missing}),
+            *drawn("diagnosis", "against", "autocorrelation", "missing"),
+        )),
+        Section("Models that were fitted", (log_table(report["log"]),)),
+        Section("The next record", (
+            *titled({"": advice}), *((advice_table(report["advice"], words),) if report["advice"] else ()),
+        )),
+        equations_section(details["equations"]),
+        made_section(details.get("made_by", {}), details["versions"], again),
+    )  # fmt: skip
     noise, name = shown(report["noise_rms"], unit)
     return Document(
         report["campaign"], "Closed loop", f"What does the declared model of {report['plant']} lack on these records?",
-        answer(report, details), tuple(sections),
+        answer(report, details), tuple(s for s in sections if s.parts),
         facts=(f"Plant {report['plant']}, {details['n_files']} records; noise {noise:.3g} {name} rms.",),
         main=(chances, *steps, parameters, errors, Text(f"verdict: {report['verdict']}"),
               Sentences((*shifts, *missing, *advice))),
@@ -298,9 +295,8 @@ def residual_section(details: Mapping[str, Any], errors: Table) -> Section:
         "see one model alone. Of long records the least and the largest sample of each short interval are drawn. "
     )
     gallery = Gallery(tuple(figures), "Measured minus simulated", "residuals")
-    return Section(
-        "Residual of each record", (gallery, errors), text + records_note(len(figures), details["n_records"])
-    )
+    note = records_note(len(figures), details["n_records"])
+    return Section("Residual of each record", (gallery, errors), text + note)
 
 
 def advice_table(advice: list[Mapping[str, Any]], words: list[str]) -> Table:
@@ -383,18 +379,22 @@ def models_of(inference: Inference) -> list[dict[str, Any]]:
 
 def conclusion(loop: ClosedLoop) -> str:
     """Return the verdict as one sentence."""
-    if loop.verdict == IMPLAUSIBLE:
-        return f"Nothing is named, as the records look wrong. {loop.next_steps[0]}"
-    of_verdict = {DISAGREES: disagreeing_sentence, CARRIES_NOT: carried_sentence, TOO_ALIKE: doubtful,
-                  UNEXPLAINED: unexplained}  # fmt: skip
-    if loop.verdict in of_verdict:
-        return of_verdict[loop.verdict](loop)
-    names = " + ".join(loop.effects)
-    return {
-        NO_DISCREPANCY: nothing_missing(loop),
-        EXPLAINED: f"The declared model lacked {names}; with it, what remains {as_noise(loop)} on {judged_on(loop)}.",
-        PARTLY: partly(loop),
-    }[loop.verdict]
+    sentence = {
+        IMPLAUSIBLE: implausible, DISAGREES: disagreeing_sentence, CARRIES_NOT: carried_sentence, TOO_ALIKE: doubtful,
+        NO_DISCREPANCY: nothing_missing, EXPLAINED: explained, PARTLY: partly, UNEXPLAINED: unexplained,
+    }  # fmt: skip
+    return sentence[loop.verdict](loop)
+
+
+def implausible(loop: ClosedLoop) -> str:
+    return f"Nothing is named, as the records look wrong. {loop.next_steps[0]}"
+
+
+def explained(loop: ClosedLoop) -> str:
+    names, judged = " + ".join(loop.effects), "train and holdout"
+    if not loop.campaign.holdout:
+        judged = "train; no record was held out to judge it"
+    return f"The declared model lacked {names}; with it, what remains {as_noise(loop)} on {judged}."
 
 
 def unexplained(loop: ClosedLoop) -> str:
@@ -475,10 +475,6 @@ def remains(loop: ClosedLoop) -> str:
     return f"what remains is {'more than ' if loop.after.significant else ''}noise"
 
 
-def judged_on(loop: ClosedLoop) -> str:
-    return "train and holdout" if loop.campaign.holdout else "train; no record was held out to judge it"
-
-
 def disagreeing_sentence(loop: ClosedLoop) -> str:
     said = [fault_sentence(s) for s in loop.suspects if s.role == "train"]
     added = f"with {' + '.join(loop.effects)} " if loop.effects else ""
@@ -534,10 +530,8 @@ def missing_sentences(missing: Missing) -> list[str]:
     curves = ", ".join(f"{d.variable}{TIMES_IN_WORDS[d.factor]} at {d.port} {d.share:.0%}" for d in ranked)
     if not curves:
         return [*said, "What the residual follows was not found: no curve predicts parts left out of its fit."]
-    return [
-        *said,
-        f"What the residual follows, with the share that a curve over it predicts on parts left out: {curves}.",
-    ]
+    shares = "What the residual follows, with the share that a curve over it predicts on parts left out"
+    return [*said, f"{shares}: {curves}."]
 
 
 def diagnosis_sentences(seen: Residuals) -> list[str]:

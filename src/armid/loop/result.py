@@ -1,6 +1,6 @@
 """What the closed loop found, for programs: the result, its doubts, records that differ, and report.json."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar
@@ -399,9 +399,8 @@ FREED, LEFT_OUT = "freed", "left_out"
 def record_faults_of(accused: Sequence[Hypothesis], model: Hypotheses, inference: Inference) -> list[RecordFault]:
     """Return the faults of records, and the drifts, among some hypotheses of a model."""
     fit = inference.exploration.fits[model]
-    return [fault_of(h.means, h.name, fit, inference) if h.kind == "record" else
-            drift_of(h.means, h.name, fit, inference)
-            for h in sorted(accused) if h.kind in ("record", "drift")]  # fmt: skip
+    told: dict[str, Callable[..., RecordFault]] = {"record": fault_of, "drift": drift_of}
+    return [told[h.kind](h.means, h.name, fit, inference) for h in sorted(accused) if h.kind in told]
 
 
 def fault_of(what: OfRecord, name: str, fit: Fit, inference: Inference) -> RecordFault:
@@ -409,34 +408,30 @@ def fault_of(what: OfRecord, name: str, fit: Fit, inference: Inference) -> Recor
     if fault.kind == "label":
         constant = record.constants[fault.constant]
         return RecordFault(record.file, record.role, "label", FREED, 1.0 - constant, fault.unit(record, plant))
-    value, half = size_of(name, fit, inference)
     output = record.output if fault.of_sensor and len(plant.outputs) > 1 else ""
-    low, high = what.largest * (value - half), what.largest * (value + half)
-    unit = fault.unit(record, plant)
-    return RecordFault(
-        record.file, record.role, fault.kind, FREED, what.largest * value, unit, low, high, output=output
-    )
+    size = size_of(name, what.largest, fault.unit(record, plant), fit, inference)
+    return RecordFault(record.file, record.role, fault.kind, FREED, *size, output=output)
 
 
 def drift_of(what: OfParameter, name: str, fit: Fit, inference: Inference) -> RecordFault:
-    value, half = size_of(f"drift of {name}", fit, inference)
     last, factor, unit = fit.records.data.records[-1], LARGEST_DRIFT, "1"
     if what.product is None:
         place = list(fit.values).index(what.name)
         factor, unit = factor * float(fit.records.span[place]), fit.model.parameters[what.name].unit
-    low, high = factor * (value - half), factor * (value + half)
     others = [n for n, p in inference.posterior.of_kind("drift").items() if n != name and p >= AS_WELL]
-    return RecordFault(
-        last.file, last.role, "trend", FREED, factor * value, unit, low, high, parameter=", ".join([name, *others])
-    )
+    size = size_of(f"drift of {name}", factor, unit, fit, inference)
+    return RecordFault(last.file, last.role, "trend", FREED, *size, parameter=", ".join([name, *others]))
 
 
-def size_of(name: str, fit: Fit, inference: Inference) -> tuple[float, float]:
-    """Return a further unknown of a fit and half its 95 % interval, in prior deviations."""
+def size_of(
+    name: str, factor: float, unit: str, fit: Fit, inference: Inference
+) -> tuple[float, str, float, float]:  # fmt: skip
+    """Return a further unknown of a fit: value, unit and 95 % interval; factor: the unit per prior deviation."""
     place = next(i for i, f in enumerate(fit.others) if f.unknown.name == name)
     covariance = expansion_of(fit, inference.exploration.scale(), inference.exploration.library).covariance
     at = fit.n_free + place
-    return fit.others[place].value, NORMAL_95 * float(np.sqrt(covariance[at, at]))
+    value, half = fit.others[place].value, NORMAL_95 * float(np.sqrt(covariance[at, at]))
+    return factor * value, unit, factor * (value - half), factor * (value + half)
 
 
 def broken_records(records: Sequence[Record]) -> list[RecordFault]:

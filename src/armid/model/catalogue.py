@@ -20,9 +20,8 @@ class Catalogue(dict[str, Thing]):
         return f"<{len(self)} by name: {', '.join(self)}>"
 
 
-PLANTS = Catalogue(
-    {p.name: p for p in (shell_transfer_arm, driven_axis, shell_transfer_arm_elastic, flexible_link, rotary_arm)}
-)
+MACHINES = (shell_transfer_arm, driven_axis, shell_transfer_arm_elastic, flexible_link, rotary_arm)
+PLANTS = Catalogue({plant.name: plant for plant in MACHINES})
 # Their order is that of reports: friction, bodies, what drives, control, what is recorded.
 FAMILIES = (friction, bodies, drive, control, sensor)
 EFFECTS = Catalogue[Effect]({effect.name: effect for family in FAMILIES for effect in family.EFFECTS})

@@ -105,10 +105,8 @@ class Effect:
     exact: "Effect | None" = None
 
     def __repr__(self) -> str:
-        names = ", ".join(p.name for p in self.parameters)
-        return (
-            f"<Effect {self.name}: {self.note or 'no note'}; at {', '.join(self.adds)}, parameters {names or 'none'}>"
-        )
+        names = ", ".join(p.name for p in self.parameters) or "none"
+        return f"<Effect {self.name}: {self.note or 'no note'}; at {', '.join(self.adds)}, parameters {names}>"
 
     def __post_init__(self) -> None:
         check_name(self.name, "effect")

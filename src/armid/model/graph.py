@@ -7,6 +7,7 @@ import re
 import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cache
 from types import FunctionType, LambdaType
 from typing import Any
 
@@ -378,24 +379,29 @@ def lambda_definition(function: LambdaType) -> ast.FunctionDef:
     """Return the definition of a lambda, found in its file by the place of its code."""
     module = inspect.getmodule(function)
     lines = inspect.findsource(function)[0] if module is None else inspect.getsourcelines(module)[0]
-    nodes = ast.walk(ast.parse("".join(lines)))
-    lambdas = [n for n in nodes if isinstance(n, ast.Lambda) and is_code_of(n, function)]
+    lambdas = [n for n in lambdas_in("".join(lines)) if is_code_of(n, function)]
     if not lambdas:
         arguments = ", ".join(inspect.signature(function).parameters)
         raise ModelError(f"the source of a lambda with the arguments {arguments} cannot be found: write it as a def")
     # The innermost: a lambda may stand inside another.
-    innermost = max(lambdas, key=lambda n: (n.lineno, n.col_offset))
+    innermost = copy.deepcopy(max(lambdas, key=lambda n: (n.lineno, n.col_offset)))
     return make_definition("<lambda>", innermost.args, [ast.Return(innermost.body)])
+
+
+@cache
+def lambdas_in(text: str) -> list[ast.Lambda]:
+    """Return the lambdas of a file; a plant has many in one."""
+    return [n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.Lambda)]
 
 
 def is_code_of(node: ast.Lambda, function: LambdaType) -> bool:
     """Tell whether the body of a lambda in a file is the code of a function."""
-    places = [p for p in function.__code__.co_positions() if p[0] is not None and p[2] is not None and p[3]]
-    body = node.body
+    code, body = function.__code__, node.body
+    if [a.arg for a in node.args.args] != list(code.co_varnames[: code.co_argcount]):
+        return False
+    places = [p for p in code.co_positions() if p[0] is not None and p[2] is not None and p[3]]
     begin, end = (body.lineno, body.col_offset), (body.end_lineno or 0, body.end_col_offset or 0)
-    inside = [begin <= (line or 0, first or 0) <= end for line, _, first, _ in places]
-    same = [a.arg for a in node.args.args] == list(function.__code__.co_varnames[: function.__code__.co_argcount])
-    return same and bool(inside) and all(inside)
+    return bool(places) and all(begin <= (line or 0, first or 0) <= end for line, _, first, _ in places)
 
 
 def make_definition(name: str, arguments: ast.arguments, body: list[ast.stmt]) -> ast.FunctionDef:

@@ -3,13 +3,12 @@
 In reading order:
 campaign  `read_campaign`: campaign.toml and its CSV files -> Campaign; the same of tables; `write_campaign`
 schema    the kinds of values in a TOML file, and the shape of campaign.toml
-reader    one [[records]] entry and its table -> Record
+reader    one [[records]] entry and its table -> Record; a measured column -> Signal: rows that are data, noise, turns
 table     CSV files of numbers or tables of pandas, and what their headers mean
 resample  even time grids out of the times of a file; which samples count
 start     the state from which a record or a piece of it is simulated
 dialect   CSV files with other separators, decimals, comments, units, encodings
 sensor    what a sensor does: step, hold, noise; samples that are no data: clipped, repeated, wild ones
-signal    one measured column: which rows are data, its noise, its turns
 record    Record (one file), its Signals, its Pieces, Irregularity: what all of that is put into
 """
 

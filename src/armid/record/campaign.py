@@ -3,12 +3,11 @@
 import os.path
 import re
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -372,9 +371,7 @@ def scaled(plant: Plant, records: Sequence[Record], where: str) -> Plant:
     return replace(plant, scales=replace(plant.scales, effort=effort, speed=speed))
 
 
-def tolerances_of(
-    told: Mapping[str, float], plant: Plant, where: str, fixed: Mapping[str, float] = MappingProxyType({})
-) -> dict[str, float]:
+def tolerances_of(told: Mapping[str, float], plant: Plant, where: str, fixed: Iterable[str] = ()) -> dict[str, float]:
     """Return the tolerance of each constant above 0: what the campaign tells, by name or as `default`, else the plant.
 
     What the plant declares as exact, or a record sets (start, target, load), keeps 0 unless it is named. fixed:
@@ -398,7 +395,6 @@ def priors_of(
     chances, known = dict[str, float](), dict[str, Known]()
     values = {*(p.name for p in plant.parameters), *(c.name for c in plant.constants)}
     for name, prior in priors.items():
-        place = f"{where}, priors.{name}"
         if isinstance(prior, float):
             if name not in effects:
                 raise unknown_name("effect", name, effects, f"{where}, priors")
@@ -406,7 +402,7 @@ def priors_of(
         elif name not in values:
             raise unknown_name("parameter or constant", name, values, f"{where}, priors")
         else:
-            known[name] = validated(Known, prior, place)
+            known[name] = validated(Known, prior, f"{where}, priors.{name}")
     return chances, known
 
 

@@ -92,12 +92,11 @@ def cells_of(text: str, wide: bool, file: str) -> Cells:
         assumed.append(f"units on line {body[0][0]}")
         body = body[1:]
     rows = [cells for _, cells in body]
-    if has_decimal_comma(rows, separator, [number for number, _ in body], file):
+    lines = tuple(number for number, _ in body)
+    if has_decimal_comma(rows, separator, lines, file):
         rows = [[c.replace(",", ".") if COMMA.fullmatch(c) else c for c in cells] for cells in rows]
         assumed.append("',' for the decimal point")
-    return Cells(
-        tuple(names), tuple(map(tuple, rows)), tuple(number for number, _ in body), header_line, tuple(assumed)
-    )
+    return Cells(tuple(names), tuple(map(tuple, rows)), lines, header_line, tuple(assumed))
 
 
 def check_names(names: Sequence[str], line: int, file: str) -> None:

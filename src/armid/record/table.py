@@ -39,27 +39,17 @@ POSITIONS |= {f"angle_{end}": ("rad/s", factor) for end, factor in SUFFIXES["rad
 class CsvTable:
     """The columns of one file.
 
-    file: name to show. columns: header -> values, (n_rows,), NaN where a cell is empty. texts: of the columns that hold
-    text, header -> its line, and what it is and what is expected. lines: of the file on which the
-    rows stand, empty where every line below the first is a row or empty. counts_per_turn: of the encoder, None where it
-    is not known.
+    file: name to show. lines: of the file, counted from 1, on which the rows and the header stand. columns: header ->
+    values, (n_rows,), NaN where a cell is empty. texts: of the columns that hold text, header -> its line, and what it
+    is and what is expected. counts_per_turn: of the encoder, None where it is not known.
     """
 
     file: str
-    path: Path
-    columns: dict[str, Array]
-    texts: dict[str, tuple[int, str]] = field(default_factory=dict)
-    lines: tuple[int, ...] = ()
+    lines: Sequence[int]
     header_line: int = 1
     counts_per_turn: float | None = None
-
-    def line_of(self, row: int) -> int:
-        """Return the line of the file, counted from 1, on which a row of numbers stands."""
-        if self.lines:
-            return self.lines[row]
-        lines = text_of(self.path, self.file)[0].split("\n")
-        filled = (number for number, line in enumerate(lines, start=1) if number > 1 and line)
-        return next(number for i, number in enumerate(filled) if i == row)
+    columns: dict[str, Array] = field(default_factory=dict)
+    texts: dict[str, tuple[int, str]] = field(default_factory=dict)
 
     @property
     def where(self) -> str:
@@ -77,7 +67,7 @@ class CsvTable:
         values = self.columns[header]
         empty = np.flatnonzero(np.isnan(values))
         if empty.size and not gaps:
-            raise ArmidError(f"{self.file}, line {self.line_of(int(empty[0]))}: {header} has no number there, as in "
+            raise ArmidError(f"{self.file}, line {self.lines[int(empty[0])]}: {header} has no number there, as in "
                              f"{empty.size} of {values.size} rows, a finite number in each is expected")  # fmt: skip
         return values
 
@@ -115,13 +105,16 @@ def read_table(path: Path, file: str, counts_per_turn: float | None = None) -> C
     if plain is not None:
         names, values = plain
         check_names(names, 1, file)
-        return table_with(zip(names, map(np.ascontiguousarray, values.T), strict=True), file, path, (), 1,
-                          counts_per_turn)  # fmt: skip
+        lines: Sequence[int] = range(2, len(values) + 2)
+        if "\n\n" in text:  # empty lines hold no row
+            lines = [number for number, line in enumerate(text.split("\n"), start=1) if number > 1 and line]
+        plain_ones = zip(names, map(np.ascontiguousarray, values.T), strict=True)
+        return filled(CsvTable(file, lines, 1, counts_per_turn), plain_ones)
     cells = cells_of(text, wide, file)
     if cells.assumed:
         warnings.warn(f"{file}: read with {', '.join(cells.assumed)}", RecordWarning, stacklevel=2)
-    columns = columns_of(cells) if cells.rows else ()
-    return table_with(columns, file, path, cells.lines, cells.header_line, counts_per_turn)
+    table = CsvTable(file, cells.lines, cells.header_line, counts_per_turn)
+    return filled(table, columns_of(cells) if cells.rows else ())
 
 
 def table_of(frame: "DataFrame", file: str, counts_per_turn: float | None = None) -> CsvTable:
@@ -135,15 +128,11 @@ def table_of(frame: "DataFrame", file: str, counts_per_turn: float | None = None
         else:
             cells = ["" if empty else str(cell).strip() for cell, empty in zip(column, column.isna(), strict=True)]
             columns += columns_of(Cells((name,), tuple((cell,) for cell in cells), lines, 1, ()))
-    return table_with(columns if lines else (), file, Path(file), lines, 1, counts_per_turn)
+    return filled(CsvTable(file, lines, 1, counts_per_turn), columns if lines else ())
 
 
-def table_with(
-    columns: Iterable[tuple[str, Array | tuple[int, str]]], file: str, path: Path, lines: tuple[int, ...],
-    header_line: int, counts_per_turn: float | None,
-) -> CsvTable:  # fmt: skip
-    """Return a table of columns: numbers, or line and text of a cell that holds text. Refuse one without columns."""
-    table = CsvTable(file, path, {}, {}, lines, header_line, counts_per_turn)
+def filled(table: CsvTable, columns: Iterable[tuple[str, Array | tuple[int, str]]]) -> CsvTable:
+    """Return a table with columns: numbers, or line and text of a cell that holds text. Refuse one without columns."""
     for name, values in columns:
         if isinstance(values, tuple):
             table.texts[name] = values[0], f"{quoted(values[1])}, a finite number"
@@ -152,11 +141,11 @@ def table_with(
         if beyond.size:
             row = int(beyond[0])
             expected = f"a number within +-{LARGEST_CELL:g}" if np.isfinite(values[row]) else "a finite number"
-            table.texts[name] = table.line_of(row), f"{values[row]:g}, {expected}"
+            table.texts[name] = table.lines[row], f"{values[row]:g}, {expected}"
         else:
             table.columns[name] = values
     if not table.headers:
-        raise ArmidError(f"{file} holds no samples: rows of numbers are expected below the header")
+        raise ArmidError(f"{table.file} holds no samples: rows of numbers are expected below the header")
     return table
 
 
@@ -193,7 +182,7 @@ def time_column(table: CsvTable) -> Array:
     if wrong.size:
         before, row = float(times[wrong[0]]), int(wrong[0]) + 1
         fault = "is there twice" if times[row] == before else f"comes after {before:.12g}"
-        raise ArmidError(f"{table.file}, line {table.line_of(row)}: time_s {float(times[row]):.12g} {fault}"
+        raise ArmidError(f"{table.file}, line {table.lines[row]}: time_s {float(times[row]):.12g} {fault}"
                          f"{why_back(table, times, row)}, increasing times are expected")  # fmt: skip
     return times
 

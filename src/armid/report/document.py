@@ -8,7 +8,7 @@ word nothing themselves; each escapes what comes from files.
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
-from difflib import SequenceMatcher
+from difflib import unified_diff
 from math import isfinite
 from typing import TYPE_CHECKING, Any, Union, overload
 
@@ -240,13 +240,8 @@ def listing(title: str, text: str, folded: bool = False) -> Listing:
 def changed(before: str, after: str) -> tuple[Line, ...]:
     """Return the lines of two texts as one, marked where they differ."""
     old, new = before.splitlines(), after.splitlines()
-    lines: list[Line] = []
-    for what, i, j, k, m in SequenceMatcher(None, old, new, autojunk=False).get_opcodes():
-        if what == "equal":
-            lines += [Line(t) for t in old[i:j]]
-            continue
-        lines += [Line(t, "-") for t in old[i:j]] + [Line(t, "+") for t in new[k:m]]
-    return tuple(lines)
+    _, _, _, *lines = unified_diff(old, new, n=len(old), lineterm="")  # behind a heading of three lines
+    return tuple(Line(line[1:], line[0].strip()) for line in lines)
 
 
 def slug(*texts: str) -> str:
@@ -320,14 +315,16 @@ def digits_of(value: float, low: float | None = None, high: float | None = None)
     return int(np.clip(wanted, USUAL_DIGITS, MOST_DIGITS))
 
 
-def stored_figures(titles: Mapping[str, tuple[str, str]], svgs: Mapping[str, str]) -> dict[str, tuple[Figure, ...]]:
-    """Return the figures of a page that are stored, by name. titles: name -> title and caption; svgs: name -> SVG."""
-    return {name: (Figure(name, *titles[name], svg=svg),) for name, svg in svgs.items()}
+def stored_figures(
+    titles: Mapping[str, tuple[str, str]], svgs: Mapping[str, str], *names: str
+) -> tuple[Figure, ...]:  # fmt: skip
+    """Return those of some figures that are stored. titles: name -> title and caption; svgs: name -> SVG."""
+    return tuple(Figure(name, *titles[name], svg=svgs[name]) for name in names if name in svgs)
 
 
-def remark_parts(first: Sequence[str], rest: Sequence[str]) -> tuple[Sentences, ...]:
-    ranked = (("What must be known", first), ("For the record", rest))
-    return tuple(Sentences(tuple(sentences), title) for title, sentences in ranked if sentences)
+def titled(sentences: Mapping[str, Sequence[str]]) -> tuple[Sentences, ...]:
+    """Return sentences under their titles, "" for none; a title without sentences is left out."""
+    return tuple(Sentences(tuple(said), title) for title, said in sentences.items() if said)
 
 
 def correlation_tables(correlation: Mapping[str, Mapping[str, float | None]]) -> tuple[Table, ...]:

@@ -1,5 +1,6 @@
 """The sensor: what is recorded of the motion, of a speed at the port `output`, of other outputs at their own."""
 
+from functools import partial
 from inspect import signature
 
 import numpy as np
@@ -22,24 +23,22 @@ def sensor_effects(plant: Plant) -> dict[str, Effect]:
 
 
 def effects_at(output: Output, plant: Plant) -> list[Effect]:
-    of, source = f"of {output.name}", "Doebelin, Measurement Systems, chapter 3"
+    name, port = output.name, output.port
     bias = Parameter("bias", SCALES_OF_UNIT.get(output.unit, output.unit), -0.1, 0.1, null=0.0)
-    effects = [Effect(f"{output.name}_bias", (bias,), {output.port: bias_error}, note=f"constant error {of}",
-                      source=source)]  # fmt: skip
+    declared = partial(Effect, source="Doebelin, Measurement Systems, chapter 3")
+    effects = [declared(f"{name}_bias", (bias,), {port: bias_error}, note=f"constant error of {name}")]
     asked = signature(plant.quantities[output.signal]).parameters if output.signal in plant.quantities else ()
-    seen = [plant.aliases.get(name, name) for name in asked if name != output.port]
+    seen = [plant.aliases.get(a, a) for a in asked if a != port]
     if len(seen) != 1:
         return effects
-    binds = {"omega": seen[0]}
-    effects.append(Effect(f"{output.name}_scale", gyro_scale.parameters, {output.port: scale_error}, binds=binds,
-                          note=f"error {of} in proportion to it", source=source))  # fmt: skip
-    effects.append(Effect(f"{output.name}_delay", output_delay.parameters, {output.port: delay_error}, binds=binds,
-                          delays=output_delay.delays, note=f"{output.name} is recorded late by a dead time",
-                          source=source))  # fmt: skip
+    declared = partial(declared, binds={"omega": seen[0]})
+    note = f"error of {name} in proportion to it"
+    effects.append(declared(f"{name}_scale", gyro_scale.parameters, {port: scale_error}, note=note))
+    effects.append(declared(f"{name}_delay", output_delay.parameters, {port: delay_error}, delays=output_delay.delays,
+                            note=f"{name} is recorded late by a dead time"))  # fmt: skip
     if seen[0] in {s.name for s in plant.states}:
-        states = (State("lagging", output.unit, lagging_rate, start_speed),)
-        effects.append(Effect(f"{output.name}_lag", output_lag.parameters, {output.port: lag_error}, states,
-                              binds=binds, note=f"{output.name} lags, first order", source=source))  # fmt: skip
+        states, note = (State("lagging", output.unit, lagging_rate, start_speed),), f"{name} lags, first order"
+        effects.append(declared(f"{name}_lag", output_lag.parameters, {port: lag_error}, states, note=note))
     return effects
 
 

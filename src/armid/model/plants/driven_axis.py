@@ -26,24 +26,12 @@ def recorded_speed(v, output):
     return v + output
 
 
-def position_rate(v):
-    return v
-
-
-def first_position(start_position):
-    return start_position
-
-
 def linear_speed_rate(drive_effort, drive, gravity_effort, torque, mass):
     return (drive_effort + drive + gravity_effort + torque) / mass
 
 
 def rotary_speed_rate(drive_effort, drive, gravity_effort, torque, inertia):
     return (drive_effort + drive + gravity_effort + torque) / inertia
-
-
-def first_speed(start_speed):
-    return start_speed
 
 
 def axis(
@@ -55,8 +43,9 @@ def axis(
         note="axis with a measured drive, linear or rotary: J dv/dt = gain u - m g l sin q",
         parameters=(inertia,),
         states=(
-            State("q", unit, position_rate, first_position, f"{'angle' if unit == 'rad' else 'position'}_{unit}"),
-            State("v", f"{unit}/s", speed_rate, first_speed, f"speed_{unit}_s"),
+            State("q", unit, lambda v: v, lambda start_position: start_position,
+                  f"{'angle' if unit == 'rad' else 'position'}_{unit}"),
+            State("v", f"{unit}/s", speed_rate, lambda start_speed: start_speed, f"speed_{unit}_s"),
         ),
         quantities={"drive_effort": drive_effort, "gravity_effort": gravity_effort, "recorded_speed": recorded_speed},
         constants=(

@@ -65,36 +65,8 @@ def recorded_deflection_speed(twist_speed, deflection_speed_sensor):
     return twist_speed + deflection_speed_sensor
 
 
-def hub_angle_rate(hub_speed):
-    return hub_speed
-
-
-def hub_speed_rate(hub_acceleration):
-    return hub_acceleration
-
-
-def twist_rate(twist_speed):
-    return twist_speed
-
-
 def twist_speed_rate(coupling_torque, tip_inertia, hub_acceleration):
     return -coupling_torque / tip_inertia - hub_acceleration
-
-
-def first_hub_angle(start_hub_angle):
-    return start_hub_angle
-
-
-def first_hub_speed(start_hub_speed):
-    return start_hub_speed
-
-
-def first_twist(start_deflection):
-    return start_deflection
-
-
-def first_twist_speed(start_deflection_speed):
-    return start_deflection_speed
 
 
 CONTACTS = (Guard("upper_contact", to_upper_contact), Guard("lower_contact", to_lower_contact))
@@ -111,10 +83,13 @@ flexible_link = Plant(
         Parameter("link_damping", "effort/speed", 0.0, 1.0, note="viscous, of the link"),
     ),
     states=(
-        State("hub_angle", "rad", hub_angle_rate, first_hub_angle, "hub_angle_state_rad"),
-        State("hub_speed", "rad/s", hub_speed_rate, first_hub_speed, "hub_speed_state_rad_s"),
-        State("twist", "rad", twist_rate, first_twist, "twist_rad"),
-        State("twist_speed", "rad/s", twist_speed_rate, first_twist_speed, "twist_speed_rad_s"),
+        State("hub_angle", "rad", lambda hub_speed: hub_speed, lambda start_hub_angle: start_hub_angle,
+              "hub_angle_state_rad"),
+        State("hub_speed", "rad/s", lambda hub_acceleration: hub_acceleration, lambda start_hub_speed: start_hub_speed,
+              "hub_speed_state_rad_s"),
+        State("twist", "rad", lambda twist_speed: twist_speed, lambda start_deflection: start_deflection, "twist_rad"),
+        State("twist_speed", "rad/s", twist_speed_rate, lambda start_deflection_speed: start_deflection_speed,
+              "twist_speed_rad_s"),
     ),
     quantities={f.__name__: f for f in (
         drive_effort, play_half, coupling_torque, hub_acceleration, recorded_hub_angle, recorded_deflection,

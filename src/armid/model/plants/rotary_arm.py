@@ -8,7 +8,7 @@ from dataclasses import replace
 from armid.model.effect import Equation, State
 from armid.model.parameter import Parameter, Scales
 from armid.model.plant import Constant, Input, Output, Plant
-from armid.model.plants.driven_axis import drive_effort, first_speed, gravity_effort, position_rate, recorded_speed
+from armid.model.plants.driven_axis import drive_effort, gravity_effort, recorded_speed
 
 
 def propeller_effort(gain, u):
@@ -25,10 +25,6 @@ def speed_rate(drive_effort, drive, gravity_effort, damping, v, torque, inertia)
     return (drive_effort + drive + gravity_effort - damping * v + torque) / inertia
 
 
-def first_angle(start_angle):
-    return start_angle
-
-
 rotary_arm = Plant(
     name="rotary_arm",
     note="arm on a level axis, q = 0 hanging, with an actuator: J dv/dt = gain u - m g l sin q - b v",
@@ -39,8 +35,8 @@ rotary_arm = Plant(
         Parameter("gain", "1", 0.0, 10.0, fixed=1.0, note="torque per unit of the command, as the actuator's law says"),
     ),
     states=(
-        State("q", "rad", position_rate, first_angle, "angle_state_rad"),
-        State("v", "rad/s", speed_rate, first_speed, "speed_state_rad_s"),
+        State("q", "rad", lambda v: v, lambda start_angle: start_angle, "angle_state_rad"),
+        State("v", "rad/s", speed_rate, lambda start_speed: start_speed, "speed_state_rad_s"),
     ),
     quantities={
         "drive_effort": drive_effort, "gravity_effort": gravity_effort, "recorded_angle": recorded_angle,

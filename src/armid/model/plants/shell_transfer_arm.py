@@ -114,10 +114,6 @@ def recorded_speed(omega, output):
     return omega + output
 
 
-def angle_rate(omega):
-    return omega
-
-
 def speed_rate(drive_effort, drive, balance_torque, gravity_torque, torque, total_inertia):
     return (gravity_torque - balance_torque + drive_effort + drive + torque) / total_inertia
 
@@ -127,29 +123,9 @@ def current_rate(voltage, supply, R, current, back_emf, winding, L_a):
     return voltage / L_a + (supply + winding - R * current - back_emf) / L_a
 
 
-def sine_rate(cosine, omega):
-    return cosine * omega
-
-
-def cosine_rate(sine, omega):
-    return -sine * omega
-
-
 def squeeze(S, l, V0, omega, compression):
     """Rate at which the gas is compressed, -dV/dt / V [1/s]."""
     return S * l / V0 * (omega * compression)
-
-
-def compression_rate(squeeze, compression):
-    return squeeze * compression
-
-
-def pressure_rate(n, pressure, squeeze):
-    return n * (pressure * squeeze)
-
-
-def start_angle(theta_C):
-    return theta_C
 
 
 def start_sine(theta_C):
@@ -166,30 +142,6 @@ def start_compression(V0, S, l, theta_C, theta_A):
 
 def start_pressure(p0, n, V0, S, l, theta_C, theta_A):
     return p0 * (V0 / (V0 - S * l * (theta_C - theta_A))) ** n
-
-
-def distance_to_switch(theta_D, theta, delta_E):
-    return np.abs(theta_D - theta) - delta_E
-
-
-def dead_zone_low(demand, u_th):
-    return demand + u_th
-
-
-def dead_zone_high(demand, u_th):
-    return demand - u_th
-
-
-def saturation_low(demand, U, u_th):
-    return demand + U + u_th
-
-
-def saturation_high(demand, U, u_th):
-    return demand - U - u_th
-
-
-def current_sign(current):
-    return current
 
 
 ARM_QUANTITIES = (
@@ -247,13 +199,13 @@ shell_transfer_arm = Plant(
         Parameter("n", "1", 0.9, 1.5, nominal=1.4, note="polytropic exponent of the gas"),
     ),
     states=(
-        State("theta", "rad", angle_rate, start_angle, "angle_rad"),
+        State("theta", "rad", lambda omega: omega, lambda theta_C: theta_C, "angle_rad"),
         State("omega", "rad/s", speed_rate, zero, "shaft_speed_rad_s"),
         State("current", "A", current_rate, zero, "current_A"),
-        State("sine", "1", sine_rate, start_sine),
-        State("cosine", "1", cosine_rate, start_cosine),
-        State("compression", "1", compression_rate, start_compression),
-        State("pressure", "Pa", pressure_rate, start_pressure),
+        State("sine", "1", lambda cosine, omega: cosine * omega, start_sine),
+        State("cosine", "1", lambda sine, omega: -sine * omega, start_cosine),
+        State("compression", "1", lambda squeeze, compression: squeeze * compression, start_compression),
+        State("pressure", "Pa", lambda n, pressure, squeeze: n * (pressure * squeeze), start_pressure),
     ),
     quantities={f.__name__: f for f in ARM_QUANTITIES},
     constants=(
@@ -267,12 +219,12 @@ shell_transfer_arm = Plant(
     ),
     ports=PORTS,
     guards=(
-        Guard("closed", distance_to_switch, latch=True),
-        Guard("dead_zone_low", dead_zone_low),
-        Guard("dead_zone_high", dead_zone_high),
-        Guard("saturation_low", saturation_low),
-        Guard("saturation_high", saturation_high),
-        Guard("current_sign", current_sign),
+        Guard("closed", lambda theta_D, theta, delta_E: np.abs(theta_D - theta) - delta_E, latch=True),
+        Guard("dead_zone_low", lambda demand, u_th: demand + u_th),
+        Guard("dead_zone_high", lambda demand, u_th: demand - u_th),
+        Guard("saturation_low", lambda demand, U, u_th: demand + U + u_th),
+        Guard("saturation_high", lambda demand, U, u_th: demand - U - u_th),
+        Guard("current_sign", lambda current: current),
     ),
     keys=(
         ManoeuvreKey("start_angle_deg", "theta_C", DEGREE, -55.0, 45.0, required=True),

@@ -10,7 +10,7 @@ from dataclasses import replace
 from armid.model.effect import State, zero
 from armid.model.plant import Constant
 from armid.model.plants import shell_transfer_arm as arm
-from armid.model.plants.flexible_link import CONTACTS, coupling_torque, play_half, twist_rate
+from armid.model.plants.flexible_link import CONTACTS, coupling_torque, play_half
 from armid.model.plants.shell_transfer_arm import demand as rigid_demand
 from armid.units import DEGREE
 
@@ -45,10 +45,6 @@ def arm_acceleration(gravity_torque, balance_torque, coupling_torque, torque, lo
     return (gravity_torque - balance_torque + coupling_torque + torque) / load_inertia
 
 
-def speed_rate(arm_acceleration):
-    return arm_acceleration
-
-
 def twist_speed_rate(drive_effort, drive, coupling_torque, drive_inertia, arm_acceleration):
     return (drive_effort + drive - coupling_torque) / drive_inertia - arm_acceleration
 
@@ -63,8 +59,8 @@ shell_transfer_arm_elastic = replace(
     name="shell_transfer_arm_elastic",
     note="shell transfer arm with a torsion spring and play between drive and arm",
     states=(
-        *(replace(s, rate=speed_rate) if s.name == "omega" else s for s in RIGID.states),
-        State("twist", "rad", twist_rate, zero, "twist_rad"),
+        *(replace(s, rate=lambda arm_acceleration: arm_acceleration) if s.name == "omega" else s for s in RIGID.states),
+        State("twist", "rad", lambda twist_speed: twist_speed, zero, "twist_rad"),
         State("twist_speed", "rad/s", twist_speed_rate, zero, "twist_speed_rad_s"),
     ),
     quantities={n: f for n, f in RIGID.quantities.items() if n != "total_inertia"} | {f.__name__: f for f in OWN},
