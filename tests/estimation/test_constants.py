@@ -21,6 +21,9 @@ class Linear:
     space = SimpleNamespace(free_names=("a", "b"))
     span = np.array([2.0, 4.0])
 
+    def walls(self, z):
+        return np.zeros(len(z)), np.ones(len(z))
+
     def __init__(self, jacobian):
         self.jacobian = jacobian
 

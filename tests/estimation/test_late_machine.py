@@ -1,6 +1,7 @@
 """What identification makes of a dead time: its value, its interval, its derivative, and that it is not a lag."""
 
 import warnings
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from armid.problem.problem import replays
 from armid.problem.space import space_of
 from armid.record import read_campaign
 from synthetic import write_records
-from winch import DRUM, FRICTION, INTERVAL, exact_speed, held_voltage, winch
+from winch import DRUM, FRICTION, INTERVAL, K_T, OHMS, exact_speed, held_voltage, winch
 
 NOISE, DELAY = 0.12, 0.0142
 PLUGIN = f"{Path(__file__).parents[1] / 'winch.py'}:winch"
@@ -86,6 +87,32 @@ def test_a_dead_time_is_no_lag_and_a_lag_no_dead_time(fitted):
             left[name, model] = chi2.chi2(chi2.shares(fit))[0] / sum(len(r.measured) for r in own)
     assert left["dead time", "dead time"] < 1.1 > left["lag", "lag"]
     assert left["dead time", "lag"] > 2.0 < left["lag", "dead time"]
+
+
+def test_an_estimate_does_not_stop_where_whole_samples_make_chi2_jump(tmp_path):
+    """A current shows a late voltage at once: at a dead time of three samples chi2 is stepped, and not to be passed."""
+    late, rng = 3, np.random.default_rng(6)
+    with_current = replace(
+        winch, quantities={**winch.quantities, "recorded_current": lambda volts, winding, k_t, w, ohms, output:
+                           (volts + winding - k_t * w) / ohms + output},
+        ports={"torque": "N m", "winding": "V", "output": "A"}, output="recorded_current", output_unit="A",
+    )  # fmt: skip
+    u = held_voltage(np.random.default_rng(2))
+    shown = np.concatenate([u[:1].repeat(late), u[:-late]])
+    current = (shown - K_T * exact_speed(u, late * INTERVAL)) / OHMS + 0.1 * rng.standard_normal(len(u))
+    table = {"time_s": INTERVAL * np.arange(len(u)), "recorded_current_A": current, "volts_V": u}
+    head = 'name = "winch"\nplant = "winch"\n'
+    campaign = read_campaign(write_records(tmp_path, head, {"a.csv": table}, holdout=0), {"winch": with_current})
+    model = Model(with_current) + EFFECTS["viscous"] + EFFECTS["drive_delay"].in_form("voltage")
+    space = space_of(model)
+    ready = replays(campaign.train, model, space)
+    for delay in (2.4, 2.9999, 3.0, 3.0001, 3.6):
+        x = refine(ready, space, np.array([DRUM, FRICTION, delay * INTERVAL]))
+        sd = information_at(ready, space, x).deviation
+        assert np.all(np.abs(x - [DRUM, FRICTION, late * INTERVAL]) <= 4.0 * sd), delay
+        assert 1e-3 * INTERVAL < sd[2] < 0.1 * INTERVAL
+        chi2 = weighted_records(ready, space, [1.0 / 0.1])
+        assert chi2.chi2(chi2.shares(x))[0] < 1.2 * len(u)
 
 
 def jittered(grid, rng):

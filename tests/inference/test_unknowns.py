@@ -44,6 +44,9 @@ class Straight:
     def padded(self, columns):
         return columns
 
+    def walls(self, z):
+        return np.zeros(len(z)), np.ones(len(z))
+
     def moved(self, i, value):
         return replace(self, residual=self.residual - value * self.columns[:, i])
 

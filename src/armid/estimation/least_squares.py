@@ -102,8 +102,8 @@ class LeastSquaresProblem:
 
         A held input that is late by whole samples jumps at a sample, which shows it or not.
         """
-        names = self.space.free_names
-        delays = [names.index(n) for n in self.model.delays if n in names]
+        late = self.model.delays if self.replays else []
+        delays = [i for i, n in enumerate(self.space.free_names) if n in late]
         grids = [piece.manoeuvre for r in self.replays for piece in r.pieces] if delays else []
         held = {m.interval for m in grids if any((i.hold or m.hold) == "zero" for i in self.model.plant.inputs)}
         low, high = self.space.low[self.space.free], self.space.high[self.space.free]
