@@ -72,3 +72,13 @@ def test_a_parameter_that_changed_between_the_records_and_records_that_are_alike
     found = closed(tmp_path / "alike", amplitude=1.0)
     assert found.verdict == "no_discrepancy"
     assert found.after.missed == []
+
+
+def test_a_record_that_only_the_doubt_lets_be_missed_confirms_nothing(tmp_path):
+    """The friction shows in the long record alone: it is missed by far more than noise, as it may be."""
+    short = {name: values[:60] for name, values in table(0.1, 1).items()}
+    campaign = write_records(tmp_path / "axis", HEAD, {"a.csv": short, "held.csv": table(1.0, 3)}, 1)
+    found = armid.close_loop(campaign, candidates=["torque_offset"], curve=False)
+    assert found.verdict != "does_not_carry_over"
+    (said,) = [s for s in found.next_steps if "neither confirms nor denies" in s]
+    assert "held.csv by" in said
