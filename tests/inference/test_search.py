@@ -8,7 +8,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from armid.inference import infer, prepared, search
+from armid.inference import infer, moves, prepared, search
 from armid.inference.candidates import EffectKey
 from armid.inference.decisions import WINDOW
 from armid.inference.evidence import expansion_of, forecast
@@ -16,7 +16,8 @@ from armid.inference.hypothesis import Hypothesis
 from armid.inference.kinds import effects, faults
 from armid.inference.library import Library
 from armid.inference.model import best_along
-from armid.inference.search import BEAM, MOST_EFFECTS, Exploration, drops, has_twin, is_outdone, next_model
+from armid.inference.moves import Exploration, drops
+from armid.inference.search import BEAM, MOST_EFFECTS, has_twin, is_outdone, next_model
 from armid.model import EFFECTS, Model
 from armid.record import read_campaign
 
@@ -179,8 +180,8 @@ def test_where_more_than_noise_is_left_the_best_of_each_size_lead_on(monkeypatch
 
 def test_a_fit_from_a_nearer_start_takes_the_place_of_a_local_one_and_its_evidence_is_its_own(monkeypatch):
     local, better = Mock(chi2=120.0), Mock(chi2=100.0)
-    monkeypatch.setattr(search, "expansion_of", lambda fit, *_: fit)
-    monkeypatch.setattr(search, "log_evidence", lambda fit: -0.5 * fit.chi2)
+    monkeypatch.setattr(moves, "expansion_of", lambda fit, *_: fit)
+    monkeypatch.setattr(moves, "log_evidence", lambda fit: -0.5 * fit.chi2)
     monkeypatch.setattr(Exploration, "scale", lambda _: None)
     found = Exploration(None, {})
     key = model("ab")

@@ -10,7 +10,8 @@ decisions     prior beliefs, from calibration.toml, and all other numbers that d
 kinds         the kinds of hypotheses, one file each: effects, faults of records, drifts, a signal without a form
 model         a model at its estimate, and refits of it; `unknowns`: constants, faults, drifts, with their priors
 evidence      how probable the records are in a model, and what a hypothesis more would do to that
-search        which models are fitted; `shooting`: far from the noise, on short pieces of the records first
+search        which models are fitted; `moves`: from one model to its neighbours; `shooting`: far from the noise, on
+              short pieces of the records first
 posterior     probabilities of hypotheses and sets; intervals that count what may be missing
 checks        whether a residual is more than noise, and where
 carry_over    what a model predicts of what its fit has not seen: records held out, parts left out in turn

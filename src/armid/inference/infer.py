@@ -25,8 +25,9 @@ from armid.inference.hypothesis import Hypotheses, Hypothesis
 from armid.inference.kinds.same_law import doubles
 from armid.inference.library import Library, library_of
 from armid.inference.model import ROUGHLY, Fit, accurate, fit_from, start_of
+from armid.inference.moves import Exploration
 from armid.inference.posterior import CONSTANTS_TEXT, Posterior, posterior, spread
-from armid.inference.search import Exploration, explore, without_denied
+from armid.inference.search import explore, without_denied
 from armid.inference.unknowns import freed
 from armid.inference.whitening import WhiteRecords, whitened, with_answers
 from armid.model import EFFECTS, Array, Effect, Model

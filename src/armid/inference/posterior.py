@@ -17,7 +17,7 @@ from armid.inference.decisions import calibration
 from armid.inference.evidence import SCALES_OF_STRENGTH, Expansion, expansion_of
 from armid.inference.hypothesis import Hypotheses, log_prior
 from armid.inference.model import Fit
-from armid.inference.search import Exploration
+from armid.inference.moves import Exploration
 from armid.inference.unknowns import residuals_at
 from armid.model import Array
 

@@ -1,13 +1,12 @@
 """Explore models: while one that may be right is not expanded, add, add a pair, drop, swap, free its shapes.
 
 Occam's window (Madigan, Raftery 1994, doi:10.1080/01621459.1994.10476894): models whose posterior is far below that
-of the best are not expanded. To first order additions, pairs and swaps come from one Gram matrix at each model; what
-leads is fitted again, as a forecast ranks and does not judge.
+of the best are not expanded. What leads to first order is fitted again, as a forecast ranks and does not judge.
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from weakref import WeakKeyDictionary
 
@@ -17,32 +16,37 @@ from armid.estimation.constants import NAMED
 from armid.inference.candidates import EffectKey
 from armid.inference.checks import is_significant
 from armid.inference.decisions import HOPELESS, REFITTED, WINDOW
-from armid.inference.evidence import (
-    Expansion,
-    Forecast,
-    Scale,
-    expansion_of,
-    forecast,
-    log_evidence,
-    scale_of,
-)
-from armid.inference.hypothesis import Hypotheses, Hypothesis, Proposal, log_prior, words
+from armid.inference.evidence import expansion_of, forecast
+from armid.inference.hypothesis import Hypotheses, Hypothesis, Proposal, words
 from armid.inference.kinds import drifts, effects, faults, unknown
 from armid.inference.library import Library
-from armid.inference.model import UNTOLD, Fit, finished, fit_from, start_of, unless_diverged, with_free_shapes
+from armid.inference.model import Fit, finished, unless_diverged, with_free_shapes
 from armid.inference.model import freed as freed_shape
+from armid.inference.moves import (
+    Exploration,
+    Trial,
+    best_begun,
+    drops,
+    exchanges,
+    is_complete,
+    is_near,
+    leading,
+    limit_of,
+    pairs,
+    simpler,
+    swaps,
+    trial_of,
+)
 from armid.inference.shooting import on_short_pieces, on_whole_records
-from armid.inference.unknowns import Unknown, constants_of, freed, polished, projected
-from armid.model import Array
+from armid.inference.unknowns import Unknown, constants_of, freed, polished
 from armid.problem.starts import fits_starts
 
-Trial = tuple[Hypotheses, Callable[[], Fit | None]]
-# Budgets of computing. Additions that are fitted at each model, those of other kinds, pairs, swaps of each effect.
-N_ADDED, N_OTHERS, N_PAIRS, N_SWAPPED, N_EXCHANGED = 8, 3, 3, 3, 2
+# Budgets of computing. Additions that are fitted at each model.
+N_ADDED = 8
 # Best models to which a signal without a form is added, of those with a name less too; signals of each.
 N_BESIDE, N_SIGNALS = 2, 2
-# Leading additions from which pairs are made; models that are expanded in all, and effects of one model.
-N_LEADING, MOST_EXPANDED, MOST_EFFECTS = 24, 16, 8
+# Models that are expanded in all, and effects of one model.
+MOST_EXPANDED, MOST_EFFECTS = 16, 8
 # Of records with more samples than this, and with so many constants within tolerances half, fewer models are expanded,
 # but for so many.
 SAMPLES, USUAL_CONSTANTS, FEWEST_EXPANDED = 4_000, 10, 8
@@ -52,93 +56,10 @@ MOST_IN_VAIN = 4
 MOST_ENDS = 3
 # A model is brought to its estimate at most so often in turn.
 MOST_COMPLETED = 4
-# Mean square of the best model, in units of the noise, up to which rivals are begun afresh.
-NEAR_NOISE = 2.0
 # Rivals that differ from the best model in one name and are brought to their estimates.
 N_TWINS = 3
-# Strengths at which a swapped effect is tried, as multiples of the linear guess.
-STRENGTHS_OF_FORM = 2.0 ** np.arange(-4, 5)
 # Models of each size that are expanded outside the window where more than noise is left.
 BEAM = 3
-
-
-@dataclass(eq=False)
-class Exploration:
-    """Hold every model that was fitted.
-
-    fits: by the hypotheses that hold in it. forecasts: of each model that was expanded. noise: the scale,
-    None: as the model shows it that leaves least. completed: models at their estimates with all unknowns freed, and the
-    weight of a square at which they were. n_expanded: how often a model was expanded. refused: models that diverge, are
-    hopeless, or hold a fault that hardly moves its record. in_vain: models that were expanded in turn without a better
-    one, far from the noise.
-    """
-
-    library: Library
-    known: dict[EffectKey, Hypothesis]
-    faults: list[Hypothesis] = field(default_factory=list)
-    drifts: list[Hypothesis] = field(default_factory=list)
-    constants: list[Unknown] = field(default_factory=list)
-    fits: dict[Hypotheses, Fit] = field(default_factory=dict)
-    forecasts: dict[Hypotheses, list[Forecast]] = field(default_factory=dict)
-    noise: Scale | None = None
-    completed: dict[Hypotheses, float] = field(default_factory=dict)
-    n_expanded: int = 0
-    refused: set[Hypotheses] = field(default_factory=set)
-    in_vain: int = 0
-    _evidence: WeakKeyDictionary[Fit, dict[Scale, float]] = field(default_factory=WeakKeyDictionary)
-    _scale: WeakKeyDictionary[Fit, Scale] = field(default_factory=WeakKeyDictionary)
-
-    @property
-    def declared(self) -> Fit:
-        return self.fits[frozenset()]
-
-    def scale(self) -> Scale:
-        """Return the scale of the model that leaves least: it shows what is noise."""
-        if self.noise is not None:
-            return self.noise
-        best = min(self.fits.values(), key=lambda f: f.chi2 + f.records.data.log_cover)
-        if best not in self._scale:
-            self._scale[best] = scale_of(best)
-        return self._scale[best]
-
-    def log_posterior(self, model: Hypotheses, scale: Scale | None = None) -> float:
-        """Return the log posterior of a model, up to a constant."""
-        fit, scale = self.fits[model], scale or self.scale()
-        known = self._evidence.setdefault(fit, {})
-        if scale not in known:
-            known[scale] = log_evidence(expansion_of(fit, scale, self.library))
-        return known[scale] + log_prior(model)
-
-    def ranked(self) -> list[tuple[Hypotheses, float]]:
-        """Return the models with their log posteriors, the best first."""
-        scale = self.scale()
-        ranking = [(model, self.log_posterior(model, scale)) for model in self.fits]
-        return sorted(ranking, key=lambda pair: -pair[1])
-
-    def take(self, model: Hypotheses, fit: Fit | None) -> bool:
-        """Keep a fit where it is better than the one that is known; tell whether it is.
-
-        What was forecast about a worse fit, whose misfit asked for other hypotheses, is forgotten.
-        """
-        if fit is None or not np.isfinite(fit.chi2):
-            return False
-        known = self.fits.get(model)
-        if known is not None:
-            scale = self.scale()
-            rise = log_evidence(expansion_of(fit, scale, self.library)) + log_prior(model)
-            rise -= self.log_posterior(model, scale)
-            if not rise > 0.0:
-                return False
-            if rise > UNTOLD:
-                self.forecasts.pop(model, None)
-        self.fits[model] = fit
-        self.completed.pop(model, None)
-        return True
-
-    def take_or_refuse(self, model: Hypotheses, fit: Fit | None) -> None:
-        """Keep a fit as `take` does; refuse a model that has none."""
-        if not self.take(model, fit) and model not in self.fits:
-            self.refused.add(model)
 
 
 def explore(library: Library, declared: Fit, most: int | None = None) -> Exploration:
@@ -345,215 +266,6 @@ def expand(exploration: Exploration, model: Hypotheses) -> None:
         exploration.take(key, again)
 
 
-def best_begun(
-    exploration: Exploration, model: Hypotheses, about: Expansion, ahead: Sequence[Forecast], limit: float, n: int
-) -> list[Trial]:
-    """Return the additions whose first steps lead farthest: far from noise a straight line is a poor guess."""
-    fit, library = about.fit, exploration.library
-    begun = library.each(lambda a: effects.first_steps(fit, about, a, library), ahead)
-    best = sorted(range(len(ahead)), key=lambda i: begun[i][0])[:n]
-    return [t for i in best for t in trial_of(exploration, model, about, ahead[i], limit, begun[i][1])]
-
-
-def exchanges(exploration: Exploration, model: Hypotheses, fit: Fit, limit: float) -> list[Trial]:
-    """Return the fits in which another effect takes the place of one of several, by its first steps there.
-
-    The effect that explains most alone may be wrong together with the others.
-    """
-    scale, trials = exploration.scale(), []
-    hypotheses = [h for h in sorted(model) if h.kind == "effect"]
-    for hypothesis in hypotheses if len(hypotheses) > 1 else []:
-        less = model - {hypothesis}
-        if less not in exploration.fits:
-            again = unless_diverged(partial(without, fit, hypothesis, exploration.library, scale.weight))
-            exploration.take(less, again)
-        if less not in exploration.fits or less in exploration.forecasts:
-            continue
-        about = expansion_of(exploration.fits[less], scale, exploration.library, with_doubts=False)
-        proposals = [p for p in effects.propose(about.fit, exploration.known, exploration.library)
-                     if p.hypothesis.name != hypothesis.name]  # fmt: skip
-        trials += best_begun(exploration, less, about, [forecast(about, p) for p in proposals], limit, N_EXCHANGED)
-    return trials
-
-
-def limit_of(exploration: Exploration, scale: Scale) -> float:
-    """Return the sum of squares from which on a model is given up: far below the best one's posterior."""
-    best = max(value for _, value in exploration.ranked()[:1])
-    return scale.reach(min(best - HOPELESS, -1.0)) if np.isfinite(best) else np.inf
-
-
-def leading(forecasts: Sequence[Forecast]) -> list[Forecast]:
-    """Return those of each kind that lead and that are not improbable."""
-    leaders = []
-    for kind in ("record", "drift"):
-        mine = [f for f in forecasts if f.proposal.hypothesis.kind == kind and f.posterior > REFITTED]
-        leaders += sorted(mine, key=lambda f: -f.posterior)[:N_OTHERS]
-    return leaders
-
-
-def trial_of(
-    exploration: Exploration, model: Hypotheses, about: Expansion, ahead: Forecast, limit: float, *begun: Array
-) -> list[Trial]:
-    """Return the fit of a model with one hypothesis more, where it is not known."""
-    key = model | {ahead.proposal.hypothesis}
-    if key in exploration.fits or not np.isfinite(ahead.total):
-        return []
-    return [(key, partial(ahead.proposal.refit, about.fit, about, ahead, limit, *begun))]
-
-
-def drops(exploration: Exploration, model: Hypotheses, again: bool = False) -> list[Trial]:
-    """Return the fits of a model without one of its effects, faults or drifts.
-
-    A fault that imitated an effect keeps its place with a size of 0 when the effect is added.
-    again: those without an effect that were fitted from elsewhere, too: they may have missed the valley to which the
-    larger model led, and a name that nothing asks for would seem needed.
-    """
-    fit, weight, trials = exploration.fits[model], exploration.scale().weight, list[Trial]()
-    sizes = {f.unknown.name for f in fit.others}
-    for hypothesis in sorted(model):
-        key, is_effect = model - {hypothesis}, hypothesis.kind == "effect"
-        is_new = key not in exploration.fits and key not in exploration.refused
-        is_asked = is_new or (again and is_effect and bool(key))
-        if is_asked and (is_effect or name_of_size(hypothesis) in sizes):
-            trials.append((key, partial(without, fit, hypothesis, exploration.library, weight)))
-    return trials
-
-
-def without(fit: Fit, hypothesis: Hypothesis, library: Library, weight: float) -> Fit | None:
-    """Return a fit without an effect, or without the size of a fault or drift."""
-    if hypothesis.kind == "effect":
-        active = tuple(k for k in fit.active if k.declared != hypothesis.means)
-        return near(fit, active, [fit.values], library, weight)
-    base, kept = fit.base, [f.unknown for f in fit.others if f.unknown.name != name_of_size(hypothesis)]
-    assert base is not None
-    return unless_diverged(lambda: freed(fit, base, kept, weight, rough=True) if kept else
-                           fit_from(base, fit.active, [fit.z], rough=True))  # fmt: skip
-
-
-def name_of_size(hypothesis: Hypothesis) -> str:
-    """Return the name of the unknown that is the size of a fault or drift."""
-    return drifts.name_of(hypothesis) if hypothesis.kind == "drift" else hypothesis.name
-
-
-def near(
-    fit: Fit, active: tuple[EffectKey, ...], guesses: Sequence[dict[str, float]], library: Library, weight: float,
-    limit: float = np.inf,
-) -> Fit | None:  # fmt: skip
-    """Return the model with some effects fitted from the best of several values, other unknowns as in a fit."""
-    problem = effects.beside(fit, active, library)
-    starts = [start_of(problem, values) for values in guesses]
-    if len(starts) > 1:
-        starts = [starts[int(np.argmin(projected(fit, problem, weight).chi2(np.array(starts))))]]
-    return effects.fitted(fit, problem, active, starts, library, weight, limit)
-
-
-def swaps(
-    exploration: Exploration, model: Hypotheses, fit: Fit, scale: Scale, proposals: Sequence[Proposal], limit: float
-) -> list[Trial]:
-    """Return the fits in which what moves the records most alike takes the place of an effect of a model.
-
-    A swap partner that was never fitted would make a posterior that is sure of the wrong one.
-    """
-    trials: dict[Hypotheses, Callable[[], Fit | None]] = {}
-    for key in fit.active:
-        hypothesis = next((h for h in model if h.means == key.declared), None)
-        if hypothesis is None:
-            continue
-        # Constants that are free to stand in for either make twins look like strangers.
-        none = np.empty((len(fit.residual), 0))
-        about = Expansion(replace(fit, others=()), scale, exploration.library, none, key)
-        others = {k.public for k in fit.active if k != key}
-        wide = effects.propose_with_free_shapes(fit, key, exploration.known, exploration.library)
-        ranking = [likest(about, p) for p in [*proposals, *wide] if p.hypothesis.name not in others]
-        ranking.sort(key=lambda pair: pair[0])
-        ranking = list({one[1].hypothesis: one for one in ranking}.values())[::-1]
-        forms = [one for one in ranking if one[1].hypothesis.name == hypothesis.name]
-        for _, proposal, variant, strength in [*forms, *ranking[:N_SWAPPED]]:
-            other = model - {hypothesis} | {proposal.hypothesis}
-            if not is_complete(exploration, other):  # a known rival may have been fitted from afar
-                start = partial(swapped, fit, key, proposal, variant, strength)
-                trials[other] = partial(start, exploration.library, scale.weight, limit)
-    return list(trials.items())
-
-
-def likest(about: Expansion, proposal: Proposal) -> tuple[float, Proposal, int, float]:
-    """Return how alike a proposal and the effect that an expansion does without move the records: squared cosine.
-
-    Both beyond what the other unknowns can do. Then the variant that is likest, and its strength in the effect's place.
-    """
-    assert about.without is not None
-    fit, own = about.fit, about.fit.owned_by(about.without)
-    slopes = fit.jacobian[:, own].T
-    nulls = [fit.model.parameters[n].null for n in np.array(list(fit.values))[own]]
-    low, span = fit.records.space.low[fit.records.space.free][own], fit.records.span[own]
-    away = np.array([0.0 if null is None else z - (null - a) / s
-                     for z, null, a, s in zip(fit.z[own], nulls, low, span, strict=True)])  # fmt: skip
-    n, grid = len(slopes), proposal.grid
-    local = [i for i, a in enumerate(grid) if a.share == effects.SLOPE]
-    if not local:
-        return 0.0, proposal, 0, 0.0
-    gram, _, _ = about.products(np.vstack([slopes, proposal.columns[local]]))
-    inner, cross, squares = gram[:n, :n], gram[:n, n:], np.maximum(np.diag(gram)[n:], 1e-300)
-    regular = inner + 1e-9 * np.trace(inner) * np.eye(n) + 1e-300 * np.eye(n)
-    alike = np.einsum("ij,ij->j", cross, np.linalg.solve(regular, cross)) / squares
-    best = int(np.argmax(alike))
-    return float(alike[best]), proposal, local[best], float(away @ cross[:, best] / squares[best])
-
-
-def swapped(
-    fit: Fit, key: EffectKey, proposal: Proposal, variant: int, strength: float, library: Library, weight: float,
-    limit: float,
-) -> Fit | None:  # fmt: skip
-    """Return the model with one effect replaced by another, its shapes free where those of the old one are."""
-    new: EffectKey = proposal.hypothesis.means
-    new = replace(new, free_shape=key.free_shape and bool(library.fixed_shapes(new)))
-    active = (*(k for k in fit.active if k != key), new)
-    values = {n: v for n, v in fit.values.items() if not key.owns(n)}
-    shares = np.clip(strength * STRENGTHS_OF_FORM, 0.01, library.reach)
-    guesses = [values | proposal.grid[variant].at(float(share)) for share in shares]
-    return near(fit, active, guesses, library, weight, limit)
-
-
-def pairs(
-    exploration: Exploration, model: Hypotheses, about: Expansion, ahead: Sequence[Forecast]
-) -> Iterable[tuple[Hypotheses, Fit | None]]:
-    """Yield the fits with two effects more that promise clearly more than the best single one."""
-    lead = sorted((f for f in ahead if np.isfinite(f.total)), key=lambda f: -f.posterior)[:N_LEADING]
-    if len(lead) < 2 or not is_significant(about.fit):
-        return
-    variants = [f.best(1)[0][0] for f in lead]
-    columns = np.array([f.proposal.columns[v] for f, v in zip(lead, variants, strict=True)])
-    gram, slope, _ = about.products(columns)
-    width = np.array([f.proposal.scales[int(np.argmax(f.log_factor[v]))] for f, v in zip(lead, variants, strict=True)])
-    prior = np.array([f.proposal.hypothesis.log_prior + f.proposal.variants[v] - np.log(len(f.proposal.scales))
-                      for f, v in zip(lead, variants, strict=True)])  # fmt: skip
-    best_single = lead[0].posterior
-    values: list[tuple[float, int, int, float, float]] = []
-    for i in range(len(lead)):
-        for k in range(i + 1, len(lead)):
-            if lead[i].proposal.hypothesis.name == lead[k].proposal.hypothesis.name:
-                continue
-            both = [i, k]
-            normal = gram[np.ix_(both, both)] + np.diag(width[both] ** -2.0)
-            mean = np.linalg.solve(normal, slope[both])
-            if (mean <= 0.0).any():
-                continue
-            rise = float(about.student(np.array(slope[both] @ mean)))
-            _, determinant = np.linalg.slogdet(normal)
-            total = rise - 0.5 * determinant - float(np.log(width[both]).sum()) + float(prior[both].sum())
-            values.append((total, i, k, float(mean[0]), float(mean[1])))
-    for total, i, k, first, second in sorted(values, reverse=True)[:N_PAIRS]:
-        one, two = lead[i].proposal, lead[k].proposal
-        key = model | {one.hypothesis, two.hypothesis}
-        if total <= best_single or key in exploration.fits or len(key) < len(model) + 2:
-            continue
-        library, values_of = exploration.library, dict(about.fit.values)
-        values_of |= one.grid[variants[i]].at(float(np.clip(first, 0.01, library.reach)))
-        values_of |= two.grid[variants[k]].at(float(np.clip(second, 0.01, library.reach)))
-        active = (*about.fit.active, one.hypothesis.means, two.hypothesis.means)
-        yield key, near(about.fit, active, [values_of], library, about.scale.weight)
-
-
 def finish(exploration: Exploration) -> None:
     """Bring the leading models of the best size to their estimates: rough fits may stand in the wrong order."""
     size = len(exploration.ranked()[0][0])
@@ -588,12 +300,6 @@ def finish_all(exploration: Exploration) -> None:
         exploration.fits[model] = polished(exploration.fits[model], weight)
 
 
-def simpler(exploration: Exploration, model: Hypotheses) -> list[Hypotheses]:
-    """Return the known models that lack one effect of a model, the most probable first."""
-    less = [model - {h} for h in sorted(model) if h.kind == "effect" and model - {h} in exploration.fits]
-    return sorted(less, key=lambda m: -exploration.log_posterior(m))
-
-
 def may_be_far_off(exploration: Exploration, model: Hypotheses) -> bool:
     """Tell whether a rough fit of a model may be far from its estimate.
 
@@ -601,12 +307,6 @@ def may_be_far_off(exploration: Exploration, model: Hypotheses) -> bool:
     """
     fit = exploration.fits[model]
     return fits_starts(fit.records.replays) or any(exploration.library.fixed_shapes(key) for key in fit.active)
-
-
-def is_complete(exploration: Exploration, model: Hypotheses) -> bool:
-    """Tell whether a model is at its estimate for about the weight that a square has by now."""
-    known = exploration.completed.get(model, 0.0)
-    return 0.5 < known / exploration.scale().weight < 2.0
 
 
 def complete(exploration: Exploration, model: Hypotheses) -> None:
@@ -623,11 +323,6 @@ def complete(exploration: Exploration, model: Hypotheses) -> None:
         fit = exploration.fits[model]
         again = unless_diverged(partial(completed, fit, exploration.library, exploration.constants, weight))
         exploration.fits[model] = again or replace(exploration.fits[model], rough=False)
-
-
-def is_near(exploration: Exploration) -> bool:
-    """Tell whether the best model is near the noise, so that a few log units count."""
-    return NEAR_NOISE * exploration.scale().weight * len(exploration.declared.residual) > exploration.scale().n
 
 
 def completed(fit: Fit, library: Library, constants: Sequence[Unknown], weight: float) -> Fit:

@@ -32,7 +32,7 @@ from armid.inference.model import (
     problem_about,
     unless_diverged,
 )
-from armid.inference.search import without
+from armid.inference.moves import without
 from armid.inference.whitening import WhiteRecords
 from armid.loop.result import (
     CARRIES_NOT,
