@@ -23,8 +23,8 @@ ONE = {
     "lanes_tanh": np.tanh, "lanes_sign": np.sign,
 }  # fmt: skip
 TWO = {
-    "lanes_power": np.power, "smaller": np.minimum, "larger": np.maximum, "both": np.logical_and,
-    "either": np.logical_or, "with_sign": np.copysign, "length": np.hypot, "arctan2": np.arctan2,
+    "lanes_power": np.power, "smaller": np.minimum, "larger": np.maximum, "with_sign": np.copysign,
+    "length": np.hypot, "arctan2": np.arctan2,
 }  # fmt: skip
 
 

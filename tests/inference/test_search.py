@@ -17,7 +17,7 @@ from armid.inference.kinds import effects, faults
 from armid.inference.library import Library
 from armid.inference.model import best_along
 from armid.inference.moves import Exploration, drops
-from armid.inference.search import BEAM, MOST_EFFECTS, has_twin, is_outdone, next_model
+from armid.inference.search import BEAM, MOST_EFFECTS, has_expanded_form, is_outdone, next_model
 from armid.model import EFFECTS, Model
 from armid.record import read_campaign
 
@@ -159,9 +159,9 @@ def test_the_most_probable_model_comes_next_that_is_neither_expanded_nor_outdone
 
 def test_a_model_in_another_form_has_the_same_neighbours():
     root, tanh = (frozenset([Hypothesis("effect", "a", form)]) for form in ("root", "tanh"))
-    assert has_twin(tanh, 1.0, [(root, 0.0)])
-    assert not has_twin(tanh, WINDOW + 1.0, [(root, 0.0)])
-    assert not has_twin(tanh, 1.0, [(tanh, 1.0), (model("b"), 0.0)])
+    assert has_expanded_form(tanh, 1.0, [(root, 0.0)])
+    assert not has_expanded_form(tanh, WINDOW + 1.0, [(root, 0.0)])
+    assert not has_expanded_form(tanh, 1.0, [(tanh, 1.0), (model("b"), 0.0)])
 
 
 def test_where_more_than_noise_is_left_the_best_of_each_size_lead_on(monkeypatch):

@@ -327,8 +327,8 @@ def descend(
 
     Levenberg-Marquardt with steps cut at the box, which hold what the box holds (More 1978, doi:10.1007/BFb0067700).
     tolerance: relative fall of chi2 in one step at which a start has arrived. central: take slopes from central
-    differences, at twice the price. limit: chi2 that must be in reach, see REACH; what gives up is where it was then.
-    most: steps.
+    differences, at twice the price. limit: chi2 that must be in reach, see REACH_OF_PATH; what
+    gives up is where it was then. most: steps.
     """
     best = descended(records, np.clip(np.array(starts), 0.0, 1.0), tolerance, central, limit, most)
     while sides := records.across(best.z):

@@ -1,7 +1,8 @@
-"""Every number with which the loop and its inference compare to decide, in one list; and prior beliefs.
+"""The numbers with which the loop and its inference decide, in one list; and prior beliefs.
 
-Prior beliefs and temperature stand in `calibration.toml`. Numerics, layout and budgets of computing are no decisions
-and stand where they are used. `estimation/data_checks.py` and `corrections.py` keep the numbers of the data checks.
+How many effects, faults and drifts to expect, and the temperature, stand in `calibration.toml`. The widths of priors
+stand where they are used, in `evidence.py` and `kinds/`; so do numerics, layout and budgets of computing.
+`estimation/data_checks.py` and `corrections.py` keep the numbers of the data checks.
 """
 
 import math
@@ -25,17 +26,18 @@ DENIED = 1.02
 OVER_NOISE = 1.1
 # Probability of a false alarm of the tests for whiteness, all together: one in 200 sound campaigns.
 SIGNIFICANCE = 0.005
-# Chance that a constant is off by more than two of its declared standard deviations, as a normal one is.
+# Probability that a declared tolerance is wrong: as often a normal constant is off by more than two deviations.
 OUT_OF_TOLERANCE = 0.05
 # Change of a record over its noise (rms) from which it is faulty: below it undoing a fault gains by smoothing alone.
 MOVES = 0.7
 # Log posterior odds within which models are expanded, and count as rivals for the next record (Madigan, Raftery 1994).
 WINDOW = math.log(100.0)
-# Log probability from which an addition is fitted: forecasts err by 2 units of log, and a claim needs the other 95 %.
+# Log odds from which an addition is fitted where noise alone is left: forecasts err by 2 units of log, and a claim
+# needs the other 95 %.
 REFITTED = math.log(0.02)
-# Log units behind the best model at which a fit is given up: forecasts and rough fits err by less.
+# Log units behind the best model at which a fit is given up, and no rival any more: rough fits err by less.
 HOPELESS = 60.0
-# Probability of a drift of another parameter from which both are named: the complement of a claim.
+# Probability from which a second drift is named as well: the complement of a claim.
 AS_WELL = 1.0 - CLAIMED
 # Held-out error over that of the train records from which it is reported; between records of EMPS it is 1.5, of the
 # pendulum 1.6, and ten times went unreported.

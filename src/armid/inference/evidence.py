@@ -56,7 +56,7 @@ class Scale:
         return float(-0.5 * (self.rest + self.n) * np.log1p(max(excess, -1.0 + 1e-12)))
 
     def variance(self, chi2: float) -> float:
-        """Return the variance of the noise in its declared unit, as a fit shows it together with the rest."""
+        """Return the variance of the noise that a fit and the rest show, as a multiple of the declared one."""
         return max((self.rest + self.weight * chi2) / (self.rest + self.n), 0.5)
 
     def reach(self, log_likelihood: float) -> float:
@@ -129,7 +129,7 @@ class Expansion:
 
     @cached_property
     def sizes(self) -> Array:
-        """Declared size of each strength of a candidate as a share of its box, NaN of other parameters, (n_free,)."""
+        """Declared size of each strength of an effect as a share of its box, NaN of other parameters, (n_free,)."""
         model, widths = self.fit.model, dict(zip(self.fit.values, self.fit.records.span, strict=True))
         is_strength = {n: self.library.owner(n) is not None and model.parameters[n].null is not None for n in widths}
         return np.array([self.library.strength_of(n, model.parameters[n]) / width if is_strength[n] else np.nan
@@ -168,10 +168,10 @@ class Expansion:
         """Posterior covariance of all unknowns, (n, n)."""
         return self.scale.variance(self.fit.chi2) * cho_solve(self.factor, np.eye(len(self.precision)))
 
-    def beyond(self, columns: Array) -> tuple[Array, Array]:
-        """Return inner products of columns, (n, n_samples), with themselves and the residual, beyond the unknowns.
+    def answers_to(self, columns: Array) -> tuple[Array, Array]:
+        """Return the weighted inner products of the unknowns with columns, and how the unknowns answer to each.
 
-        The answers of the unknowns, (n_unknowns, n), are the third.
+        columns: (n, n_samples). Both results: (n_unknowns, n).
         """
         mixed = self.scale.weight * (columns @ self.unknowns).T
         answer = cho_solve(self.factor, mixed)
@@ -179,14 +179,14 @@ class Expansion:
 
     def products(self, columns: Array) -> tuple[Array, Array, Array]:
         """Return Gram matrix and slopes of columns beyond the unknowns, and how the unknowns answer to each column."""
-        mixed, answer = self.beyond(columns)
+        mixed, answer = self.answers_to(columns)
         gram = self.scale.weight * columns @ columns.T - mixed.T @ answer
         slope = self.scale.weight * columns @ self.fit.residual - answer.T @ self.gradient
         return gram, slope, answer
 
     def squares(self, columns: Array) -> tuple[Array, Array, Array]:
         """Return what `products` does, of the Gram matrix its diagonal."""
-        mixed, answer = self.beyond(columns)
+        mixed, answer = self.answers_to(columns)
         square = self.scale.weight * np.einsum("ij,ij->i", columns, columns) - np.einsum("ij,ij->j", mixed, answer)
         slope = self.scale.weight * columns @ self.fit.residual - answer.T @ self.gradient
         return np.maximum(square, 0.0), slope, answer
@@ -207,6 +207,7 @@ class Forecast:
 
     log_factor: log Bayes factor of each variant and scale, their prior included, (n_variants, n_scales). strength:
     expected, of each. answer: of the unknowns per full strength, (n_unknowns, n_variants). deviation: of the strength.
+    Of a joint proposal: strength is the prior scale, answer and deviation are those of all unknowns at the best scale.
     """
 
     proposal: Proposal

@@ -43,8 +43,9 @@ class Proposal:
     columns: change of the whitened signal per full strength, (n_variants, n_samples). joint: whether all columns act
     together, each with a strength of its own; otherwise exactly one of them holds. one_sided: whether strengths are
     positive. scales: prior standard deviations of a strength, equally likely, (n_scales,). variants: log prior of each
-    variant, (n_variants,). refit: of a fit, its expansion, the forecast and a sum of squares that must be in reach, the
-    model with the hypothesis. grid: of an effect, the strength and the shapes of each variant.
+    variant, (n_variants,). refit(fit, expansion, forecast, limit): the fit with the hypothesis, None where there is
+    none; limit: the sum of squares that must be in reach. grid: of an effect, the strength and the shapes of each
+    variant.
     """
 
     hypothesis: Hypothesis

@@ -93,7 +93,7 @@ class Inference:
 
     @property
     def named(self) -> list[Hypotheses]:
-        """The models whose parts all have names, by the probability of the names, whose forms share it; then by own.
+        """The models whose parts all have names, by the summed probability of all forms, then by their own.
 
         Those with an effect at its null are left out.
         """
@@ -299,10 +299,11 @@ def infer(library: Library, declared: Fit) -> Inference:
     """Return how probable it is that a declared model lacks each effect of a library, from the train records.
 
     Each hypothesis (an effect, a fault of one record, a drift, a signal without a form) is a block of further unknowns
-    with a prior. Models are explored in Occam's window; `evidence` says how a model gets its probability.
+    with a prior, or a covariance. Models are explored in Occam's window; `evidence` says how one gets its probability.
+    All is repeated if inputs prove exact, noise in motion is another than at rest, or noise of inputs may be the rest.
     """
     inference = inferred(library, declared)
-    # First, as inputs that are taken for noisy look like noise in motion.
+    # First exact inputs: those that are wrongly taken for noisy look like noise in motion.
     exact = with_exact_inputs(library, inference)
     is_exact = exact is not library
     if is_exact:

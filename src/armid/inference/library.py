@@ -320,8 +320,8 @@ N_PROBES_ABOUT, NEAR_VALUE, SUBSTEPS_TRIED = 8, 2.0, (1, 2, 4, 8)
 # From so many steps between samples on it is tried whether rough samples alone ask for them, and which these are: those
 # in which a step is uncertain by such a share of the range of a state.
 FEWEST_SPARED, SHARES_OF_ERROR = 4, (1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
-# Strengths that are tried, as shares of the way from the null to a bound; shapes: points along each of 1, 2, 3 ranges.
-STRENGTHS_TRIED, STRENGTHS_OF_SHAPES = (0.03, 0.1, 0.3, 1.0), (0.05, 0.4)
+# A weak strength, as a share of the way from the null to a bound; shapes: points along each of 1, 2, 3 ranges.
+WEAK_STRENGTH = 0.03
 SHAPES = {0: (), 1: (8,), 2: (7, 3), 3: (5, 3, 2)}
 # Ratio of sampling intervals within which what is tried is simulated in the same steps.
 SAME_INTERVAL = 1.05
@@ -356,7 +356,7 @@ def calibrated_replays(
     if nulls:
         weak = 0.5 * (low + high)
         for i, null in nulls.items():
-            weak[i] = null + STRENGTHS_TRIED[0] * max(low[i] - null, high[i] - null, key=abs)
+            weak[i] = null + WEAK_STRENGTH * max(low[i] - null, high[i] - null, key=abs)
         rows = np.vstack([rows, weak])
     spread = space.complete(rows)
     outputs = [o.name for o in model.plant.outputs]
@@ -462,17 +462,17 @@ class Activation:
 
 
 def activation_grid(
-    records: WhiteRecords, key: EffectKey, ranges: Mapping[str, tuple[float, float]] | None = None
-) -> tuple[list[Activation], int]:
-    """Return the grid over strengths and shapes of one effect, and the number of its shapes.
+    records: WhiteRecords, key: EffectKey, ranges: Mapping[str, tuple[float, float]], shares: Sequence[float]
+) -> list[Activation]:
+    """Return the grid over strengths and shapes of one effect.
 
     Strengths are the free parameters with a null value: each alone, and all together where there are several.
-    ranges: of parameters whose box is wider than what is tried.
+    ranges: of parameters whose box is wider than what is tried. shares: of the range, over which a strength is tried.
     """
     space, declared = records.space, records.model.parameters
     mine = [n for n in space.free_names if key.owns(n)]
     null = {n: float(v) for n in mine if (v := declared[n].null) is not None}
-    bound = {n: (space.low[space.index(n)], space.high[space.index(n)]) for n in mine} | dict(ranges or {})
+    bound = {n: (space.low[space.index(n)], space.high[space.index(n)]) for n in mine} | dict(ranges)
     shapes = [n for n in mine if n not in null]
     along = [points_within(*bound[n], count) for n, count in zip(shapes, shape_counts(len(shapes)), strict=True)]
     points = [dict(zip(shapes, map(float, p), strict=True)) for p in product(*along)]
@@ -481,9 +481,8 @@ def activation_grid(
     for names, side, shape in product(chosen, (1, 0), points):
         full = {n: float(bound[n][side]) if n in names else null[n] for n in null}
         if all(full[n] != null[n] for n in names):
-            shares = STRENGTHS_OF_SHAPES if shapes else STRENGTHS_TRIED
             activations += [Activation(shape | full, null, share) for share in shares]
-    return activations, len(points)
+    return activations
 
 
 def shape_counts(n_shapes: int) -> tuple[int, ...]:

@@ -31,7 +31,7 @@ class Fit:
 
     active: the effects that were added. records: the least-squares problem. z: free parameters as shares of their
     range, (n_free,). residual: whitened, measured minus simulated, (n_samples,). constants: by how much each differs
-    from its declared value, as a share of it; the records hold them so. rough: whether z is near the estimate only.
+    from its declared value, as a share of it; the records hold them so.
     others: further unknowns that were fitted, see `unknowns.Freed`; the records hold their values. base: the records
     before that, None where there are none.
     """
@@ -41,7 +41,6 @@ class Fit:
     z: Array
     residual: Array
     constants: Mapping[str, float] = field(default_factory=dict)
-    rough: bool = False
     base: WhiteRecords | None = None
     others: tuple[Any, ...] = ()
     _products: dict[tuple[tuple[str, float], ...], tuple[Product, ...]] = field(default_factory=dict)
@@ -198,7 +197,7 @@ def fit_from(
             raise ArmidError("each start of a fit diverged: other bounds are expected")
         make = partial(descend, records, list(good), tolerance, limit=limit)
         z = make() if kept is None else kept.recalled((tried, chi2, tolerance, limit), make)
-    return Fit(tuple(active), records, z, records.plain.residuals(z)[0], rough=rough)
+    return Fit(tuple(active), records, z, records.plain.residuals(z)[0])
 
 
 def accurate_enough(fit: Fit) -> Fit:
@@ -225,7 +224,7 @@ def with_own_starts(fit: Fit, roughly: bool = False) -> Fit:
         return fit
     for _ in range(MOST_ROUNDS):
         last, records = fit, replace(fit.records, replays=with_starts(fit.records.replays, fit.candidate))
-        fit = replace(fit_from(records, fit.active, [fit.z], rough=roughly), constants=fit.constants, rough=False)
+        fit = replace(fit_from(records, fit.active, [fit.z], rough=roughly), constants=fit.constants)
         untold = UNTOLD / fit.independent if roughly else 0.0
         if np.all(np.abs(fit.z - last.z) <= SETTLED_CHI2) or abs(last.chi2 / fit.chi2 - 1.0) <= max(
             SETTLED_CHI2, untold

@@ -1,6 +1,7 @@
-"""What a search has fitted, and the models that differ from one of these by a move: add, exchange, drop, swap, pair.
+"""What a search has fitted, and the neighbours of a model.
 
-To first order additions, pairs and swaps come from one Gram matrix at each model.
+A neighbour has one effect, fault or drift more; a pair of effects more; one fewer (a drop); another effect, by its
+first steps (an exchange) or by its likeness (a swap, other forms too). `search` adds signals, and frees shapes.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -26,7 +27,7 @@ Trial = tuple[Hypotheses, Callable[[], Fit | None]]
 N_OTHERS, N_PAIRS, N_SWAPPED, N_EXCHANGED = 3, 3, 3, 2
 # Leading additions from which pairs are made.
 N_LEADING = 24
-# Mean square of the best model, in units of the noise, up to which rivals are begun afresh.
+# Mean square of the residual over that of the noise below which a search counts as near the noise.
 NEAR_NOISE = 2.0
 # Strengths at which a swapped effect is tried, as multiples of the linear guess.
 STRENGTHS_OF_FORM = 2.0 ** np.arange(-4, 5)
@@ -36,11 +37,11 @@ STRENGTHS_OF_FORM = 2.0 ** np.arange(-4, 5)
 class Exploration:
     """Hold every model that was fitted.
 
-    fits: by the hypotheses that hold in it. forecasts: of each model that was expanded. noise: the scale,
-    None: as the model shows it that leaves least. completed: models at their estimates with all unknowns freed, and the
-    weight of a square at which they were. n_expanded: how often a model was expanded. refused: models that diverge, are
-    hopeless, or hold a fault that hardly moves its record. in_vain: models that were expanded in turn without a better
-    one, far from the noise.
+    fits: by the hypotheses that hold in it. forecasts: of each model that was expanded. noise: the scale, None: that of
+    the model that leaves least. completed: models that were brought to their estimates, and the weight of a square at
+    which they were. n_expanded: how often a model was expanded. refused: models that diverge, are hopeless, or hold a
+    fault that hardly moves its record. in_vain: models that were expanded in turn without a better one, far from the
+    noise.
     """
 
     library: Library
@@ -88,7 +89,7 @@ class Exploration:
     def take(self, model: Hypotheses, fit: Fit | None) -> bool:
         """Keep a fit where it is better than the one that is known; tell whether it is.
 
-        What was forecast about a worse fit, whose misfit asked for other hypotheses, is forgotten.
+        Forecasts from the worse fit, whose misfit asked for other hypotheses, are deleted.
         """
         if fit is None or not np.isfinite(fit.chi2):
             return False
@@ -114,7 +115,7 @@ class Exploration:
 def best_begun(
     exploration: Exploration, model: Hypotheses, about: Expansion, ahead: Sequence[Forecast], limit: float, n: int
 ) -> list[Trial]:
-    """Return the additions whose first steps lead farthest: far from noise a straight line is a poor guess."""
+    """Return the trials of the additions whose first steps leave least: a straight line misleads far from noise."""
     fit, library = about.fit, exploration.library
     begun = library.each(lambda a: effects.first_steps(fit, about, a, library), ahead)
     best = sorted(range(len(ahead)), key=lambda i: begun[i][0])[:n]
@@ -143,15 +144,15 @@ def exchanges(exploration: Exploration, model: Hypotheses, fit: Fit, limit: floa
 
 
 def limit_of(exploration: Exploration, scale: Scale) -> float:
-    """Return the sum of squares from which on a model is given up: far below the best one's posterior."""
-    best = max(value for _, value in exploration.ranked()[:1])
+    """Return the sum of squares above which a fit stops: it is hopelessly behind the best model."""
+    best = exploration.ranked()[0][1]
     return scale.reach(min(best - HOPELESS, -1.0)) if np.isfinite(best) else np.inf
 
 
 def leading(forecasts: Sequence[Forecast]) -> list[Forecast]:
-    """Return those of each kind that lead and that are not improbable."""
+    """Return the leading forecasts of each kind, without improbable ones."""
     leaders = []
-    for kind in ("record", "drift"):
+    for kind in dict.fromkeys(f.proposal.hypothesis.kind for f in forecasts):
         mine = [f for f in forecasts if f.proposal.hypothesis.kind == kind and f.posterior > REFITTED]
         leaders += sorted(mine, key=lambda f: -f.posterior)[:N_OTHERS]
     return leaders
@@ -160,7 +161,7 @@ def leading(forecasts: Sequence[Forecast]) -> list[Forecast]:
 def trial_of(
     exploration: Exploration, model: Hypotheses, about: Expansion, ahead: Forecast, limit: float, *begun: Array
 ) -> list[Trial]:
-    """Return the fit of a model with one hypothesis more, where it is not known."""
+    """Return the trial of a model with one hypothesis more, none where it is fitted already."""
     key = model | {ahead.proposal.hypothesis}
     if key in exploration.fits or not np.isfinite(ahead.total):
         return []
@@ -170,9 +171,8 @@ def trial_of(
 def drops(exploration: Exploration, model: Hypotheses, again: bool = False) -> list[Trial]:
     """Return the fits of a model without one of its effects, faults or drifts.
 
-    A fault that imitated an effect keeps its place with a size of 0 when the effect is added.
-    again: those without an effect that were fitted from elsewhere, too: they may have missed the valley to which the
-    larger model led, and a name that nothing asks for would seem needed.
+    A fault may have imitated an effect, and have a size of 0 now.
+    again: fit smaller models from here, too. Their first fit may have missed this minimum, and the name seem needed.
     """
     fit, weight, trials = exploration.fits[model], exploration.scale().weight, list[Trial]()
     sizes = {f.unknown.name for f in fit.others}
@@ -205,7 +205,7 @@ def near(
     fit: Fit, active: tuple[EffectKey, ...], guesses: Sequence[dict[str, float]], library: Library, weight: float,
     limit: float = np.inf,
 ) -> Fit | None:  # fmt: skip
-    """Return the model with some effects fitted from the best of several values, other unknowns as in a fit."""
+    """Fit a model with some effects from the best of several guesses, its further unknowns as in another fit."""
     problem = effects.beside(fit, active, library)
     starts = [start_of(problem, values) for values in guesses]
     if len(starts) > 1:
@@ -216,21 +216,21 @@ def near(
 def swaps(
     exploration: Exploration, model: Hypotheses, fit: Fit, scale: Scale, proposals: Sequence[Proposal], limit: float
 ) -> list[Trial]:
-    """Return the fits in which what moves the records most alike takes the place of an effect of a model.
+    """Return, for each effect, the fits of the replacements whose columns have the largest cosine with its own.
 
-    A swap partner that was never fitted would make a posterior that is sure of the wrong one.
+    Otherwise the posterior would be too sure of the effect that was tried first.
     """
     trials: dict[Hypotheses, Callable[[], Fit | None]] = {}
     for key in fit.active:
         hypothesis = next((h for h in model if h.means == key.declared), None)
         if hypothesis is None:
             continue
-        # Constants that are free to stand in for either make twins look like strangers.
+        # Constants that are free would hide the likeness.
         none = np.empty((len(fit.residual), 0))
         about = Expansion(replace(fit, others=()), scale, exploration.library, none, key)
         others = {k.public for k in fit.active if k != key}
         wide = effects.propose_with_free_shapes(fit, key, exploration.known, exploration.library)
-        ranking = [likest(about, p) for p in [*proposals, *wide] if p.hypothesis.name not in others]
+        ranking = [likeness(about, p) for p in [*proposals, *wide] if p.hypothesis.name not in others]
         ranking.sort(key=lambda pair: pair[0])
         ranking = list({one[1].hypothesis: one for one in ranking}.values())[::-1]
         forms = [one for one in ranking if one[1].hypothesis.name == hypothesis.name]
@@ -242,7 +242,7 @@ def swaps(
     return list(trials.items())
 
 
-def likest(about: Expansion, proposal: Proposal) -> tuple[float, Proposal, int, float]:
+def likeness(about: Expansion, proposal: Proposal) -> tuple[float, Proposal, int, float]:
     """Return how alike a proposal and the effect that an expansion does without move the records: squared cosine.
 
     Both beyond what the other unknowns can do. Then the variant that is likest, and its strength in the effect's place.
@@ -283,7 +283,7 @@ def swapped(
 def pairs(
     exploration: Exploration, model: Hypotheses, about: Expansion, ahead: Sequence[Forecast]
 ) -> Iterable[tuple[Hypotheses, Fit | None]]:
-    """Yield the fits with two effects more that promise clearly more than the best single one."""
+    """Yield fits with two effects more, forecast above the best single one, where more than noise is left."""
     lead = sorted((f for f in ahead if np.isfinite(f.total)), key=lambda f: -f.posterior)[:N_LEADING]
     if len(lead) < 2 or not is_significant(about.fit):
         return
@@ -333,5 +333,5 @@ def is_complete(exploration: Exploration, model: Hypotheses) -> bool:
 
 
 def is_near(exploration: Exploration) -> bool:
-    """Tell whether the best model is near the noise, so that a few log units count."""
+    """Tell whether the model that fits best is near the noise, so that a few log units count."""
     return NEAR_NOISE * exploration.scale().weight * len(exploration.declared.residual) > exploration.scale().n

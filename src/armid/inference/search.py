@@ -1,7 +1,7 @@
-"""Explore models: while one that may be right is not expanded, add, add a pair, drop, swap, free its shapes.
+"""Explore models: while one that may be right is not expanded, fit its neighbours (`moves` says which these are).
 
 Occam's window (Madigan, Raftery 1994, doi:10.1080/01621459.1994.10476894): models whose posterior is far below that
-of the best are not expanded. What leads to first order is fitted again, as a forecast ranks and does not judge.
+of the best are not expanded. Leading forecasts are then fitted, because a forecast only ranks.
 """
 
 from collections import Counter
@@ -43,27 +43,27 @@ from armid.problem.starts import fits_starts
 
 # Budgets of computing. Additions that are fitted at each model.
 N_ADDED = 8
-# Best models to which a signal without a form is added, of those with a name less too; signals of each.
+# Best models that get a signal without a form, and as many with one effect fewer; signals that are tried for each.
 N_BESIDE, N_SIGNALS = 2, 2
 # Models that are expanded in all, and effects of one model.
 MOST_EXPANDED, MOST_EFFECTS = 16, 8
-# Of records with more samples than this, and with so many constants within tolerances half, fewer models are expanded,
-# but for so many.
-SAMPLES, USUAL_CONSTANTS, FEWEST_EXPANDED = 4_000, 10, 8
-# Far from the noise: models that are expanded in turn without a better one, after which what is missing has no name.
+# Above so many samples fewer models are expanded, but at least so many; so many constants within tolerances halve the
+# number.
+SAMPLES, FEWEST_EXPANDED, USUAL_CONSTANTS = 4_000, 8, 10
+# Far from the noise: expansions without a better model after which the search stops, as what is missing has no name.
 MOST_IN_VAIN = 4
-# Models that are expanded once more where the search ends at one that is not.
+# Most expansions of a last model that was never expanded.
 MOST_ENDS = 3
-# A model is brought to its estimate at most so often in turn.
+# Most completions of one model in a row.
 MOST_COMPLETED = 4
-# Rivals that differ from the best model in one name and are brought to their estimates.
-N_TWINS = 3
-# Models of each size that are expanded outside the window where more than noise is left.
+# Rivals that differ from the best model in one name and are completed.
+N_RIVALS = 3
+# Best models of each size that are expanded outside the window, completed, polished, carried on from short pieces.
 BEAM = 3
 
 
 def explore(library: Library, declared: Fit, most: int | None = None) -> Exploration:
-    """Return the models that the train records ask for, from the declared one on.
+    """Return the models that were explored from the declared one.
 
     declared: its fit. most: models that are expanded, None: as many as the samples allow.
     """
@@ -79,7 +79,7 @@ def explore(library: Library, declared: Fit, most: int | None = None) -> Explora
         best = exploration.ranked()[0][0]
         if best in exploration.forecasts or exploration.fits[best].records.data.cover is not None:
             break
-        # Drops from larger models led here: what may replace its effects was never fitted.
+        # Drops reached this model: its own additions and swaps were never fitted.
         expand(exploration, best)
         finish_all(exploration)
     return exploration
@@ -108,7 +108,7 @@ def expand_all(exploration: Exploration, most: int | None) -> bool:
         if model is None:
             return True
         complete(exploration, model)
-        # Near the noise a second name must not stand for a shape of the first that was held.
+        # Near the noise free the shapes of the smaller model first: a second effect may only correct a held shape.
         for less in simpler(exploration, model) if is_near(exploration) else []:
             if may_be_far_off(exploration, less):
                 complete(exploration, less)
@@ -137,7 +137,7 @@ def take_from_short_pieces(exploration: Exploration) -> None:
 
 
 def without_denied(exploration: Exploration, denied: Hypotheses, standing: Hypotheses) -> Exploration:
-    """Return what was explored without hypotheses that held-out records deny, and without larger sets than what stands.
+    """Return the exploration without models that hold a denied hypothesis, and without larger ones than what stands.
 
     What is left over then is something unknown: no other name was judged in place of those.
     """
@@ -153,10 +153,10 @@ def without_denied(exploration: Exploration, denied: Hypotheses, standing: Hypot
 
 
 def add_unknown(exploration: Exploration) -> bool:
-    """Add a signal without a form to the best models; tell whether there is a new one.
+    """Add a signal without a form to some models; return whether a model was added.
 
-    Where the best model leaves noise alone, to those with a name less: several wrong names together can explain an
-    effect that the library does not hold.
+    To the declared one and the best ones with one effect fewer than the best: several wrong names together can explain
+    an effect that the library does not hold. Where the best model leaves more than noise, to the best ones as well.
     """
     ranked = exploration.ranked()
     if any(h.kind == "unknown" for m in exploration.fits for h in m):
@@ -169,7 +169,7 @@ def add_unknown(exploration: Exploration) -> bool:
 
 
 def add_signals(exploration: Exploration, models: Sequence[Hypotheses]) -> bool:
-    """Add signals without a form to some models; return whether a model is new."""
+    """Add signals without a form to some models; return whether a model was added."""
     library, scale, before = exploration.library, exploration.scale(), len(exploration.fits)
     limit = limit_of(exploration, scale)
     for model in models:
@@ -186,14 +186,14 @@ def add_signals(exploration: Exploration, models: Sequence[Hypotheses]) -> bool:
 def next_model(exploration: Exploration) -> Hypotheses | None:
     """Return the model that is to be expanded next, None where all in the window are.
 
-    Where the best model leaves more than noise, the best ones of each smaller size may lead on as well: a strong second
-    effect can mislead the choice of the first. Far from the noise these come first, the smallest before all (a beam).
+    Where the best model leaves more than noise, the best effect-only models of each size up to its own may lead on as
+    well: a strong second effect can mislead the choice of the first. Far from the noise these come first (a beam).
     """
     ranked = exploration.ranked()
     best, top = ranked[0]
     expanded = [(m, value) for m, value in ranked if m in exploration.forecasts]
     near = [m for m, value in ranked if value > top - WINDOW
-            and not (is_outdone(m, value, ranked) or has_twin(m, value, expanded))]  # fmt: skip
+            and not (is_outdone(m, value, ranked) or has_expanded_form(m, value, expanded))]  # fmt: skip
     if is_significant(exploration.fits[best]) and exploration.fits[best].records.data.cover is None:
         plain = [m for m, _ in ranked if all(h.kind == "effect" for h in m)]
         beam = [m for n in range(1, len(best) + 1) for m in [m for m in plain if len(m) == n][:BEAM]]
@@ -201,8 +201,8 @@ def next_model(exploration: Exploration) -> Hypotheses | None:
     return next((m for m in near if m not in exploration.forecasts and len(m) < MOST_EFFECTS), None)
 
 
-def has_twin(model: Hypotheses, value: float, expanded: Sequence[tuple[Hypotheses, float]]) -> bool:
-    """Tell whether a model of the same names in other forms that may be right was expanded: it has the same neighbours.
+def has_expanded_form(model: Hypotheses, value: float, expanded: Sequence[tuple[Hypotheses, float]]) -> bool:
+    """Tell whether an expanded model in the window has the same names in other forms: its neighbours are the same.
 
     The model at which the search ends is expanded all the same.
     """
@@ -211,7 +211,7 @@ def has_twin(model: Hypotheses, value: float, expanded: Sequence[tuple[Hypothese
 
 
 def is_outdone(model: Hypotheses, value: float, ranked: Sequence[tuple[Hypotheses, float]]) -> bool:
-    """Tell whether a model with fewer of its hypotheses is more probable: such a model is not expanded."""
+    """Tell whether a subset of its hypotheses is more probable: then a model is not expanded."""
     return any(less < model and more > value for less, more in ranked)
 
 
@@ -219,13 +219,13 @@ def with_constants(fit: Fit, constants: Sequence[Unknown], weight: float) -> Fit
     """Return a fit with all its further unknowns freed again, the constants that have a tolerance among them."""
     kept = [f.unknown for f in fit.others if not f.unknown.name.startswith(NAMED)]
     if not (kept or constants):
-        return replace(fit, rough=False)
+        return fit
     again = unless_diverged(lambda: freed(fit, fit.base or fit.records, [*kept, *constants], weight))
-    return replace(again or fit, rough=False)
+    return again or fit
 
 
 def expand(exploration: Exploration, model: Hypotheses) -> None:
-    """Fit the most promising changes of a model: additions of every kind, pairs, swaps, drops, free shapes."""
+    """Fit the most promising neighbours of a model: see `moves`; signals and free shapes come later."""
     fit, library, scale = exploration.fits[model], exploration.library, exploration.scale()
     library = library.for_misfit(fit.misfit) if fit.base is None else library
     library.say(f"expanding {words(model) if model else 'the declared model'}")
@@ -253,7 +253,7 @@ def expand(exploration: Exploration, model: Hypotheses) -> None:
     trials += [t for f in leading(beside) for t in trial_of(exploration, model, about, f, limit)]
     ranked = exploration.ranked()
     is_far = is_significant(fit) and not is_near(exploration)
-    if is_far and model == ranked[0][0]:  # before the drops: it fits what it stands on
+    if is_far and model == ranked[0][0]:  # first, because exchanges fit the smaller models
         trials += exchanges(exploration, model, fit, limit)
     trials += drops(exploration, model)
     if not is_far and exploration.log_posterior(model, scale) > ranked[0][1] - WINDOW:
@@ -267,7 +267,7 @@ def expand(exploration: Exploration, model: Hypotheses) -> None:
 
 
 def finish(exploration: Exploration) -> None:
-    """Bring the leading models of the best size to their estimates: rough fits may stand in the wrong order."""
+    """Complete the best models with as many hypotheses as the best: rough fits may be misranked."""
     size = len(exploration.ranked()[0][0])
     for model in [m for m, _ in exploration.ranked() if len(m) == size][:BEAM]:
         complete(exploration, model)
@@ -287,9 +287,9 @@ def finish_all(exploration: Exploration) -> None:
         best, top = ranked[0]
         todo += [m for m in simpler(exploration, best)
                  if not is_complete(exploration, m) and may_be_far_off(exploration, m)]  # fmt: skip
-        # A name must not stand for its twin, whose rough fit may be far from its estimate.
-        twins = [m for m, value in ranked if len(m) == len(best) and len(m - best) == 1 and value > top - HOPELESS]
-        todo += [m for m in twins[:N_TWINS]
+        # A name must not win because the rough fit of its rival is far from its estimate.
+        rivals = [m for m, value in ranked if len(m) == len(best) and len(m - best) == 1 and value > top - HOPELESS]
+        todo += [m for m in rivals[:N_RIVALS]
                  if m not in todo and not is_complete(exploration, m) and may_be_far_off(exploration, m)]  # fmt: skip
         if not todo:
             break
@@ -303,7 +303,7 @@ def finish_all(exploration: Exploration) -> None:
 def may_be_far_off(exploration: Exploration, model: Hypotheses) -> bool:
     """Tell whether a rough fit of a model may be far from its estimate.
 
-    That holds where an effect has a shape that its declaration holds, or records start as they do in another model.
+    That holds where an effect has a shape that its declaration holds, or where starts of records are fitted.
     """
     fit = exploration.fits[model]
     return fits_starts(fit.records.replays) or any(exploration.library.fixed_shapes(key) for key in fit.active)
@@ -312,7 +312,7 @@ def may_be_far_off(exploration: Exploration, model: Hypotheses) -> bool:
 def complete(exploration: Exploration, model: Hypotheses) -> None:
     """Bring a model to its estimate, with its shapes, its constants and its further unknowns freed.
 
-    Where that makes it the best, a square weighs more than before, and constants are freed once more.
+    Where that makes it the one that fits best, a square weighs more than before, and it is completed once more.
     """
     for _ in range(MOST_COMPLETED):
         if is_complete(exploration, model):
@@ -322,13 +322,13 @@ def complete(exploration: Exploration, model: Hypotheses) -> None:
             return
         fit = exploration.fits[model]
         again = unless_diverged(partial(completed, fit, exploration.library, exploration.constants, weight))
-        exploration.fits[model] = again or replace(exploration.fits[model], rough=False)
+        exploration.fits[model] = again or exploration.fits[model]
 
 
 def completed(fit: Fit, library: Library, constants: Sequence[Unknown], weight: float) -> Fit:
     """Return a fit at its estimate, its further unknowns freed again, and its shapes where chi2 falls."""
     if fit.records.data.cover is not None:
-        return replace(fit, rough=False)
+        return fit
     return with_constants(with_fitted_shapes(finished(fit, library), library), constants, weight)
 
 

@@ -185,18 +185,17 @@ def freed(
             columns = columns_about(base.plain, unknowns, values, z, {})
     if not np.isfinite(cost):
         raise ArmidError("a fit with further unknowns diverged: other bounds are expected")
-    return landed(fit, base, unknowns, values, z, residual, columns, rough)
+    return landed(fit, base, unknowns, values, z, residual, columns)
 
 
 def landed(
     fit: Fit, base: WhiteRecords, unknowns: Sequence[Unknown], values: Array, z: Array, residual: Array, columns: Array,
-    rough: bool,
 ) -> Fit:  # fmt: skip
     """Return a fit with other values of its parameters and further unknowns; residual: there, see `costs_at`."""
     records = moved(base, unknowns, values)
     others = tuple(Freed(u, float(v), c) for u, v, c in zip(unknowns, values, columns.T, strict=True))
     return replace(fit, records=records, z=z, residual=residual[: len(columns)], base=base,
-                   others=others, rough=rough, constants=shares_of([u.product for u in unknowns], values))  # fmt: skip
+                   others=others, constants=shares_of([u.product for u in unknowns], values))  # fmt: skip
 
 
 def polished(fit: Fit, weight: float) -> Fit:
@@ -237,7 +236,7 @@ def polished(fit: Fit, weight: float) -> Fit:
     if not after < before:
         return fit
     columns = columns_about(base.plain, unknowns, values, z, {})
-    return landed(fit, base, unknowns, values, z, there, columns, fit.rough)
+    return landed(fit, base, unknowns, values, z, there, columns)
 
 
 def normal_equations(

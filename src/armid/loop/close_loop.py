@@ -225,7 +225,7 @@ def rejudged(
 
 
 def steps_of(inference: Inference, path: Sequence[Hypotheses], judged: Sequence[Judgement]) -> tuple[Step, ...]:
-    """Return a step for each effect of the model in force; a model of faults alone is a step without an effect."""
+    """Return a step for each effect of the model in force; a model of faults alone has none."""
     steps, exploration = [], inference.exploration
     candidates, fit = exploration.library.candidates, exploration.fits[inference.in_force]
     for model, last, after in zip(path[1:], path, judged[1:], strict=False):

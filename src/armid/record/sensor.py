@@ -294,7 +294,7 @@ def stands_still(rest: Array, size: float, is_speed: bool) -> bool:
     first, second = rest[: rest.size // 2], rest[rest.size // 2 :]
     drifts = abs(float(np.mean(first) - np.mean(second))) > STANDS * error
     sizes = np.maximum([np.std(first), np.std(second)], np.finfo(np.float64).tiny)
-    log_ratio = 2.0 * abs(float(np.log(sizes[0] / sizes[1])))
+    log_ratio = 2.0 * abs(float(np.log(sizes[0]) - np.log(sizes[1])))
     return not drifts and independent >= FEWEST_INDEPENDENT and log_ratio <= STANDS * np.sqrt(8.0 / independent)
 
 

@@ -87,8 +87,7 @@ def proposals(
 
 def proposal(fit: Fit, hypothesis: Hypothesis, key: EffectKey, library: Library) -> Proposal | None:
     records = beside(fit, (*fit.active, key), library)
-    activations, _ = activation_grid(records, key, library.declared_ranges(records.model, key))
-    grid = [replace(a, share=share) for a in activations if a.share == activations[0].share for share in SHARES_TRIED]
+    grid = activation_grid(records, key, library.declared_ranges(records.model, key), SHARES_TRIED)
     moved = responses(fit, records, grid)
     good = np.flatnonzero(np.isfinite(moved).all(axis=1) & (np.abs(moved).max(axis=1, initial=0.0) > 0.0))
     if not len(good):

@@ -15,7 +15,7 @@ from armid.inference.evidence import Expansion, Forecast
 from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.library import Library
 from armid.inference.model import Fit, fit_from, unless_diverged
-from armid.inference.unknowns import Unknown, freed
+from armid.inference.unknowns import Unknown, freed, moved
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array, Model, Plant
 from armid.problem.problem import ReadyRecord, Replay, signals_of, with_each
@@ -127,7 +127,7 @@ def resampled(signal: Array, places: Array) -> Array:
 
 
 def sinc_weights(n: int, places: Array) -> tuple[NDArray[np.int64], Array]:
-    """Return for each place which of n samples are near, and what each weighs, (n_places, 2 REACH) both."""
+    """Return for each place which of n samples are near, and what each weighs, (n_places, 2 SIDE_SAMPLES) both."""
     inside = np.clip(places, 0.0, n - 1.0)
     first = np.minimum(np.floor(inside), n - 2.0).astype(np.int64) - SIDE_SAMPLES + 1
     near = first[:, np.newaxis] + np.arange(2 * SIDE_SAMPLES)
@@ -319,10 +319,9 @@ def refit(hypothesis: Hypothesis, fit: Fit, about: Expansion, ahead: Forecast, l
     """Return the model with a fault undone, its size fitted with all other unknowns."""
     what: OfRecord = hypothesis.means
     base = fit.base or fit.records
-    unknown = what.unknown(hypothesis.name, base)
     if what.fault.kind == "label":
-        return unless_diverged(lambda: relabelled(fit, what, limit))
-    unknowns = [*(f.unknown for f in fit.others), unknown]
+        return unless_diverged(lambda: relabelled(fit, what, about.scale.weight, limit))
+    unknowns = [*(f.unknown for f in fit.others), what.unknown(hypothesis.name, base)]
     again = unless_diverged(lambda: freed(fit, base, unknowns, about.scale.weight, limit, rough=True))
     if again is None:
         return None
@@ -331,7 +330,11 @@ def refit(hypothesis: Hypothesis, fit: Fit, about: Expansion, ahead: Forecast, l
     return again if moves >= MOVES else None
 
 
-def relabelled(fit: Fit, what: OfRecord, limit: float) -> Fit:
-    """Return the model with another load, or key, of a record than its file says."""
-    problem = what.moved(fit.records, 1.0)
-    return fit_from(problem, fit.active, [fit.z, np.full(fit.n_free, 0.5)], limit=limit)
+def relabelled(fit: Fit, what: OfRecord, weight: float, limit: float) -> Fit:
+    """Return the model with another load, or key, of a record than its file says; its further unknowns move on."""
+    base, unknowns = what.moved(fit.base or fit.records, 1.0), [f.unknown for f in fit.others]
+    problem = moved(base, unknowns, [f.value for f in fit.others])
+    again = fit_from(problem, fit.active, [fit.z, np.full(fit.n_free, 0.5)], limit=limit)
+    if not unknowns:
+        return again
+    return freed(replace(again, base=base, others=fit.others), base, unknowns, weight, limit)
