@@ -19,8 +19,8 @@ from armid.estimation.noise_model import NoiseModel, levels_in_motion, levels_le
 from armid.inference.candidates import constant_effects
 from armid.inference.carry_over import predicting_best
 from armid.inference.checks import is_significant, train_residuals
-from armid.inference.decisions import LISTED, MENTIONED, calibration
-from armid.inference.evidence import Expansion, expansion_of
+from armid.inference.decisions import LISTED, calibration
+from armid.inference.evidence import expansion_of
 from armid.inference.hypothesis import Hypotheses, Hypothesis
 from armid.inference.kinds.same_law import doubles
 from armid.inference.library import Library, library_of
@@ -87,7 +87,7 @@ class Inference:
         """
         if self.standing is not None:
             return self.standing
-        if self.posterior.probability("unknown") < MENTIONED:
+        if not self.posterior.unknown_is_likely:
             return self.named[0]
         return predicting_best(self.named, self.exploration.fits, self.exploration.library)
 
@@ -166,8 +166,8 @@ class Inference:
     def intervals(self) -> dict[str, Interval]:
         """Of each parameter of the model in force; those of an effect over the models that hold it."""
         fit, intervals = self.exploration.fits[self.in_force], {}
-        alone = Expansion(replace(fit, others=()), self.exploration.scale(), self.exploration.library,
-                          np.empty((len(fit.residual), 0)))  # fmt: skip
+        scale, library = self.exploration.scale(), self.exploration.library
+        alone = expansion_of(replace(fit, others=()), scale, library, with_doubts=False)
         of_noise = dict(zip(fit.values, fit.records.span * np.sqrt(np.diag(spread(alone))), strict=True))
         sizes = [f.unknown.name for f in self.best.others if not f.unknown.name.startswith(NAMED)]
         constants = self.best.deviations
@@ -321,7 +321,7 @@ def infer(library: Library, declared: Fit) -> Inference:
     if is_exact or not pooled_noise(library.data.records):
         return inference
     fit = inference.exploration.fits[inference.in_force]
-    if fit.active and inference.posterior.probability("unknown") >= MENTIONED:
+    if fit.active and inference.posterior.unknown_is_likely:
         # the declared model may answer to its inputs quite otherwise
         answering = with_measured_inputs(as_exact(library), fit)
         if may_be_all(answering, fit):
@@ -448,7 +448,7 @@ def with_noise_in_motion(library: Library, inference: Inference) -> Library:
     differences make it look larger than it is, which hides effects.
     """
     fit, best = inference.exploration.fits[inference.in_force], inference.best
-    is_unknown, read = inference.posterior.probability("unknown") >= MENTIONED, library.as_read or library.data
+    is_unknown, read = inference.posterior.unknown_is_likely, library.as_read or library.data
     if not is_unknown and read.known:
         return library
     seen = train_residuals(fit)

@@ -14,6 +14,7 @@ from itertools import product
 from typing import TypeVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from armid.engine import STANDARD, Calibration, Schedule, Simulation, accuracy_against, probes, simulate
 from armid.engine.calibrate import ALLOWED, MARGIN_OF_STEPS, difference, switch_weights
@@ -139,6 +140,10 @@ class Library:
             return self
         data = replace(self.data, records=tuple(ready.record for ready in by_record(replays)))
         return replace(self, data=data, _problems={})
+
+    def reachable(self, strengths: ArrayLike) -> Array:
+        """Return strengths, as shares of their declared range, within what a fit may start from."""
+        return np.asarray(np.clip(strengths, WEAKEST_START, self.reach), dtype=np.float64)
 
     def for_misfit(self, misfit: float) -> "Library":
         """Return the library for what comes next to a fit with such a misfit; itself where that is about its own."""
@@ -320,8 +325,9 @@ N_PROBES_ABOUT, NEAR_VALUE, SUBSTEPS_TRIED = 8, 2.0, (1, 2, 4, 8)
 # From so many steps between samples on it is tried whether rough samples alone ask for them, and which these are: those
 # in which a step is uncertain by such a share of the range of a state.
 FEWEST_SPARED, SHARES_OF_ERROR = 4, (1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
-# A weak strength, as a share of the way from the null to a bound; shapes: points along each of 1, 2, 3 ranges.
-WEAK_STRENGTH = 0.03
+# A weak strength, and the weakest from which a fit starts, as shares of the way from the null to a bound; shapes:
+# points along each of 1, 2, 3 ranges.
+WEAK_STRENGTH, WEAKEST_START = 0.03, 0.01
 SHAPES = {0: (), 1: (8,), 2: (7, 3), 3: (5, 3, 2)}
 # Ratio of sampling intervals within which what is tried is simulated in the same steps.
 SAME_INTERVAL = 1.05

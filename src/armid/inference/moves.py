@@ -226,8 +226,8 @@ def swaps(
         if hypothesis is None:
             continue
         # Constants that are free would hide the likeness.
-        none = np.empty((len(fit.residual), 0))
-        about = Expansion(replace(fit, others=()), scale, exploration.library, none, key)
+        alone = expansion_of(replace(fit, others=()), scale, exploration.library, with_doubts=False)
+        about = replace(alone, without=key)
         others = {k.public for k in fit.active if k != key}
         wide = effects.propose_with_free_shapes(fit, key, exploration.known, exploration.library)
         ranking = [likeness(about, p) for p in [*proposals, *wide] if p.hypothesis.name not in others]
@@ -275,7 +275,7 @@ def swapped(
     new = replace(new, free_shape=key.free_shape and bool(library.fixed_shapes(new)))
     active = (*(k for k in fit.active if k != key), new)
     values = {n: v for n, v in fit.values.items() if not key.owns(n)}
-    shares = np.clip(strength * STRENGTHS_OF_FORM, 0.01, library.reach)
+    shares = library.reachable(strength * STRENGTHS_OF_FORM)
     guesses = [values | proposal.grid[variant].at(float(share)) for share in shares]
     return near(fit, active, guesses, library, weight, limit)
 
@@ -314,8 +314,8 @@ def pairs(
         if total <= best_single or key in exploration.fits or len(key) < len(model) + 2:
             continue
         library, values_of = exploration.library, dict(about.fit.values)
-        values_of |= one.grid[variants[i]].at(float(np.clip(first, 0.01, library.reach)))
-        values_of |= two.grid[variants[k]].at(float(np.clip(second, 0.01, library.reach)))
+        values_of |= one.grid[variants[i]].at(float(library.reachable(first)))
+        values_of |= two.grid[variants[k]].at(float(library.reachable(second)))
         active = (*about.fit.active, one.hypothesis.means, two.hypothesis.means)
         yield key, near(about.fit, active, [values_of], library, about.scale.weight)
 

@@ -13,7 +13,7 @@ from scipy.special import logsumexp, ndtr
 
 from armid.estimation.least_squares import held_by_bound
 from armid.inference.checks import train_residuals
-from armid.inference.decisions import calibration
+from armid.inference.decisions import MENTIONED, calibration
 from armid.inference.evidence import SCALES_OF_STRENGTH, Expansion, expansion_of
 from armid.inference.hypothesis import Hypotheses, log_prior
 from armid.inference.model import Fit
@@ -166,6 +166,11 @@ class Posterior:
             below = float(weights @ ndtr((middle - means) / deviations))
             low, high = (middle, high) if below < share else (low, middle)
         return 0.5 * (low + high)
+
+    @property
+    def unknown_is_likely(self) -> bool:
+        """Whether it is more likely than not that something acts which no name explains."""
+        return self.probability("unknown") >= MENTIONED
 
     @property
     def best_is_unknown(self) -> bool:

@@ -264,7 +264,7 @@ def verdicts_of(
 ) -> tuple[str, ...]:  # fmt: skip
     """Return the verdicts that hold, each in one word, the most important first."""
     post = inference.posterior
-    unknown = post.probability("unknown") >= MENTIONED
+    unknown = post.unknown_is_likely
     verdicts = [CARRIES_NOT] if withdrawn is not None or after.fails_to_carry_over else []
     verdicts += [DISAGREES] if any(h.kind in ("record", "drift") for h in accused) else []
     in_doubt = any(s.probability < CLAIMED for s in steps) if steps else post.nothing < MENTIONED

@@ -13,7 +13,7 @@ from armid.estimation.information import NORMAL_95
 from armid.estimation.least_squares import held_by_bound
 from armid.inference.carry_over import Missed, least_noise, missed_records
 from armid.inference.checks import Diagnosis, Residuals
-from armid.inference.decisions import AS_WELL, CLAIMED, MENTIONED, OVER_NOISE
+from armid.inference.decisions import AS_WELL, CLAIMED, OVER_NOISE
 from armid.inference.evidence import expansion_of
 from armid.inference.hypothesis import Hypotheses, Hypothesis, words
 from armid.inference.infer import Inference
@@ -254,7 +254,7 @@ def estimates(
     known = {**own, **inference.intervals} if model == inference.in_force else own
     space, held = fit.records.space, held_by_bound(fit.records.space, fit.x)
     active = {key.declared for key in fit.active}
-    is_unknown = inference.posterior.probability("unknown") >= MENTIONED
+    is_unknown = inference.posterior.unknown_is_likely
     estimates = []
     for name, value, unit in zip(space.names, map(float, fit.candidate), space.units, strict=True):
         owner = library.owner(name)

@@ -119,7 +119,7 @@ def refit(
     active = (*fit.active, key)
     problem = beside(fit, active, library)
     if begun is None:
-        starts = np.array(starts_of(fit, about, ahead, problem, library))
+        starts = np.array(starts_of(fit, ahead, problem, library))
         order = np.argsort(projected(fit, problem, about.scale.weight).chi2(starts), kind="stable")
         best = starts[order[:2]]
     else:
@@ -161,10 +161,7 @@ def first_steps(fit: Fit, about: Expansion, ahead: Forecast, library: Library) -
     """Return where the first steps of a fit from the best start lead: the sum of squares, and the candidate."""
     key = ahead.proposal.hypothesis.means
     problem = beside(fit, (*fit.active, key), library)
-    starts, projection = (
-        np.array(starts_of(fit, about, ahead, problem, library)),
-        projected(fit, problem, about.scale.weight),
-    )
+    starts, projection = np.array(starts_of(fit, ahead, problem, library)), projected(fit, problem, about.scale.weight)
     chi2 = projection.chi2(starts)
     best = starts[int(np.argmin(chi2))]
     if not np.isfinite(chi2.min()):
@@ -173,13 +170,11 @@ def first_steps(fit: Fit, about: Expansion, ahead: Forecast, library: Library) -
     return float(projection.chi2(z)[0]), z
 
 
-def starts_of(
-    fit: Fit, about: Expansion, ahead: Forecast, problem: WhiteRecords, library: Library
-) -> list[Array]:  # fmt: skip
+def starts_of(fit: Fit, ahead: Forecast, problem: WhiteRecords, library: Library) -> list[Array]:
     """Return extended candidates at expected and tried strengths, with the linear answer of the parameters."""
     starts, grid = [], ahead.proposal.grid
     for variant, strength in ahead.best(N_STARTS_OF_EFFECT):
-        for share in dict.fromkeys((float(np.clip(strength, 0.01, library.reach)), grid[variant].share)):
+        for share in dict.fromkeys((float(library.reachable(strength)), grid[variant].share)):
             z = np.clip(fit.z - share * ahead.answer[: fit.n_free, variant], 0.01, 0.99)
             values = dict(zip(fit.values, fit.records.values(z), strict=True)) | grid[variant].at(share)
             starts.append(np.clip(problem.shares(free_values(problem, values)), 1e-3, 1.0 - 1e-3))
