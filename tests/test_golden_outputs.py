@@ -23,7 +23,7 @@ from stand.blind import campaign
 
 ROOT = Path(__file__).parents[1]
 GOLDEN = ROOT / "tests" / "golden"
-CAMPAIGNS = ("paper_arm", "one_stroke", "four_strokes", "rocking_shell")
+CAMPAIGNS = ("one_stroke", "four_strokes", "rocking_shell")
 IDENTIFIERS = ("pso", "de", "cmaes", "bobyqa", "least_squares", "pso+least_squares")
 FAST = ("least_squares", "pso+least_squares")
 INTERVALS = ("pso", *FAST)
