@@ -26,6 +26,8 @@ from calibration.campaigns import HIDDEN, MACHINE, PLANTS, Task, campaign_of, fi
 
 KEPT = ("version", "verdict", "also", "effects", "steps", "suspects", "withdrawn", "error", "parameters",
         "probabilities")  # fmt: skip
+# After so many campaigns a process begins afresh: what is compiled for each machine is kept in its memory.
+TASKS_OF_PROCESS = 20
 # Models of a smaller weight are not kept.
 LEAST = 1e-5
 
@@ -50,11 +52,7 @@ def main(words: Sequence[str]) -> int:
     open_tasks = [t for t in tasks(options.size) if not file_of(options.folder, t).exists()]
     close = partial(closed, options.folder, options.seed, options.without_left_out)
     print(f"{len(open_tasks)} campaigns to close", flush=True)
-    if options.jobs == 1:
-        for task in open_tasks:
-            print(close(task), flush=True)
-        return 0
-    with ProcessPoolExecutor(options.jobs, get_context("spawn")) as pool:
+    with ProcessPoolExecutor(options.jobs, get_context("spawn"), max_tasks_per_child=TASKS_OF_PROCESS) as pool:
         for line in pool.map(close, open_tasks):
             print(line, flush=True)
     return 0
