@@ -188,3 +188,12 @@ def test_a_constant_is_defined_in_one_file():
             homes[name].add(str(file.relative_to(root)))
     assert {name: files for name, files in homes.items() if len(files) > 1 and name not in SLOTS} == {}
     assert all(len(homes[name]) > 1 for name in SLOTS)
+
+
+def test_two_classes_never_share_a_name():
+    places = defaultdict(list)
+    for path, tree in TREES.items():
+        for node in tree.body:
+            if isinstance(node, ast.ClassDef):
+                places[node.name].append(path.name)
+    assert {name: files for name, files in places.items() if len(files) > 1} == {}

@@ -13,7 +13,7 @@ from armid.contract.check import check_campaign
 from armid.engine.simulate import Prepared
 from armid.errors import ArmidError
 from armid.estimation.corrections import Correction, moved
-from armid.estimation.data_checks import Trial, chosen, data_issues, shortened
+from armid.estimation.data_checks import DataTrial, chosen, data_issues, shortened
 from armid.model import EFFECTS
 from armid.problem.space import space_of
 from armid.record import read_campaign, write_table
@@ -289,7 +289,7 @@ def test_a_long_record_is_simulated_whole_only_to_learn_how_few_samples_will_do(
     assert sum(steps) < 120 * n
     model = read.model()
     whole = shortened(read.train[0], 1)
-    thinned = Trial(model, space_of(model, read.parameters)).thinned(whole, 1)
+    thinned = DataTrial(model, space_of(model, read.parameters)).thinned(whole, 1)
     assert (whole.n_samples, thinned.n_samples) == (n, 1 + n // 12)
     assert thinned.duration == pytest.approx(whole.duration, rel=1e-3)
     change(SPEED, np.negative, "lower.csv")(folder)

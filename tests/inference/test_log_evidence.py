@@ -8,7 +8,7 @@ import pytest
 from scipy.stats import multivariate_normal, norm
 
 from armid.estimation.constants import NAMED
-from armid.inference.decisions import Calibration, calibration
+from armid.inference.decisions import PriorBeliefs, calibration
 from armid.inference.evidence import Expansion, Scale, forecast, log_tails
 from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.posterior import Atom, Posterior, most_odds, truncated
@@ -94,7 +94,7 @@ def test_unknowns_that_are_projected_out_are_those_of_a_joint_fit_and_prior_odds
     best = np.linalg.solve(np.eye(3) + columns.T @ columns, columns.T @ residual)
     left = residual - columns @ best
     assert white @ white == pytest.approx(left @ left + best @ best)
-    beliefs = Calibration(1.0, {"effect": 0.7}, {"coulomb": 4.0})
+    beliefs = PriorBeliefs(1.0, {"effect": 0.7}, {"coulomb": 4.0})
     odds = (0.7 / 36) / (1 - 0.7 / 36)
     assert np.exp(beliefs.log_odds("effect", 36)) == pytest.approx(odds)
     assert np.exp(beliefs.log_odds("effect", 36, "coulomb")) == pytest.approx(4.0 * odds)

@@ -237,7 +237,7 @@ GUESSED_MODELS = {
 
 
 @dataclass(frozen=True)
-class Column:
+class FileColumn:
     """One column.
 
     header: in the file; words: what it is called without its unit; end: of the unit, "" for none; unit: as the file has
@@ -251,20 +251,20 @@ class Column:
     factor: float = 1.0
 
 
-def column_of(header: str) -> Column:
+def column_of(header: str) -> FileColumn:
     apart = re.fullmatch(r"(.*?)[ _]*[\[(]([^\])]*)[\])]", header)
     if apart is None and header.rpartition(" ")[2] in {*UNIT_ENDS, *DRIVEN_IN}:
         apart = re.fullmatch(r"(.*) (\S+)", header)
     if apart:
         words, unit = apart[1].strip().lower().replace(" ", "_"), apart[2].strip()
         end, factor = DRIVEN_IN.get(unit, (UNIT_ENDS.get(unit, ""), 1.0))
-        return Column(header, words, end, "" if end else unit, factor)
+        return FileColumn(header, words, end, "" if end else unit, factor)
     ends = {*UNIT_ENDS.values(), *SECONDS}
     end = max((e for e in ends if header.endswith(f"_{e}") or header == e == "rpm"), key=len, default="")
-    return Column(header, header.removesuffix(f"_{end}").lower().replace(" ", "_") if end else header.lower(), end)
+    return FileColumn(header, header.removesuffix(f"_{end}").lower().replace(" ", "_") if end else header.lower(), end)
 
 
-def quantity_of(column: Column) -> str:
+def quantity_of(column: FileColumn) -> str:
     """Return what a column is: a key of WORDS, "" for nothing that is known."""
     parts = set(re.split(r"[^a-z]+", column.words))
     for quantity, words in WORDS_OF_HEADERS.items():
@@ -309,7 +309,7 @@ def guessed_campaign(
     return guessed_text(name, tables, written, renamed, [*drives], notes, model, named), written
 
 
-def moves_straight(roles: Mapping[str, Column], table: CsvTable) -> bool:
+def moves_straight(roles: Mapping[str, FileColumn], table: CsvTable) -> bool:
     """Return whether a machine is a linear axis; refuse one that no plant of armid is, and units that are not known."""
     linear = any(roles[q].end in LINEAR for q in roles if q != "time")
     if linear and "speed" not in roles:
@@ -326,7 +326,7 @@ def moves_straight(roles: Mapping[str, Column], table: CsvTable) -> bool:
     return linear
 
 
-def roles_in(table: CsvTable, plant: Plant, notes: list[str]) -> tuple[dict[str, Column], dict[str, str]]:
+def roles_in(table: CsvTable, plant: Plant, notes: list[str]) -> tuple[dict[str, FileColumn], dict[str, str]]:
     """Return output or input of a known plant -> column, and -> header in a record; the time is a column as well.
 
     The plant reads a column by its name, else it is the first in the unit. That of an input may have no unit.
@@ -335,7 +335,7 @@ def roles_in(table: CsvTable, plant: Plant, notes: list[str]) -> tuple[dict[str,
     ports = outputs | {i.name: ((*i.columns, i.name), (UNIT_ENDS.get(i.unit, ""),)) for i in plant.inputs}
     columns = [column_of(header) for header in table.columns]
     by_name = {header for read, _ in ports.values() for header in read}
-    roles, headers = dict[str, Column](), dict[str, str]()
+    roles, headers = dict[str, FileColumn](), dict[str, str]()
     for name, (read, ends) in ports.items():
         spare = [c for c in columns if c not in roles.values() and c.header not in by_name and not c.unit]
         fit = [c for c in spare if c.end and c.end in ends and c.end not in COUNT_ENDS]
@@ -358,7 +358,7 @@ def roles_in(table: CsvTable, plant: Plant, notes: list[str]) -> tuple[dict[str,
     return {"time": time_of(table, columns, roles), **roles}, headers
 
 
-def check_unit(quantity: str, column: Column, linear: bool, where: str) -> None:
+def check_unit(quantity: str, column: FileColumn, linear: bool, where: str) -> None:
     """Refuse a unit that is not known or not that of its quantity; the input of a turning machine may have any."""
     if quantity == "time" or (quantity == "drive" and not linear):
         return
@@ -368,10 +368,10 @@ def check_unit(quantity: str, column: Column, linear: bool, where: str) -> None:
         raise ArmidError(f"{where} is {quoted(column.unit or column.end)}: one of {', '.join(known)} is expected")
 
 
-def roles_of(table: CsvTable) -> dict[str, Column]:
+def roles_of(table: CsvTable) -> dict[str, FileColumn]:
     """Return quantity -> column of a file: the time, what was measured, and what drove it."""
     columns = [column_of(header) for header in table.columns]
-    roles: dict[str, Column] = {}
+    roles: dict[str, FileColumn] = {}
     for column in columns:
         roles.setdefault(quantity_of(column), column)
     roles.pop("", None)
@@ -384,7 +384,7 @@ def roles_of(table: CsvTable) -> dict[str, Column]:
         what = "an input (drive_V, current_A)" if "drive" not in roles else motion
         raise ArmidError(f"{table.where}: no name or unit among {quoted(list(table.columns))} is that of {what}: such "
                          "a name is expected")  # fmt: skip
-    if "speed" in roles and roles.get("position", Column("", "", "")).end == "counts":
+    if "speed" in roles and roles.get("position", FileColumn("", "", "")).end == "counts":
         del roles["position"]
     for quantity in ("speed", "position"):
         if quantity in roles and roles[quantity].end in COUNT_ENDS:
@@ -394,7 +394,7 @@ def roles_of(table: CsvTable) -> dict[str, Column]:
     return roles
 
 
-def time_of(table: CsvTable, columns: Sequence[Column], roles: Mapping[str, Column]) -> Column:
+def time_of(table: CsvTable, columns: Sequence[FileColumn], roles: Mapping[str, FileColumn]) -> FileColumn:
     """Return the column of the time: by its name, else the first that rises."""
     unknown = [c for c in columns if c not in roles.values()]
     named = [c for c in columns if quantity_of(c) == "time"]
@@ -405,7 +405,7 @@ def time_of(table: CsvTable, columns: Sequence[Column], roles: Mapping[str, Colu
     return [*named, *rising][0]
 
 
-def new_headers(roles: Mapping[str, Column], linear: bool, notes: list[str]) -> dict[str, str]:
+def new_headers(roles: Mapping[str, FileColumn], linear: bool, notes: list[str]) -> dict[str, str]:
     """Return quantity -> header as a record has it, but for the time; notes: a line for each guess is added."""
     headers = {}
     for quantity, column in roles.items():
@@ -421,7 +421,7 @@ def new_headers(roles: Mapping[str, Column], linear: bool, notes: list[str]) -> 
     return headers
 
 
-def seconds_of(column: Column, table: CsvTable, notes: list[str]) -> float:
+def seconds_of(column: FileColumn, table: CsvTable, notes: list[str]) -> float:
     """Return what turns a column of time into seconds."""
     times = table.numbers(column.header)
     back = np.flatnonzero(np.diff(times) <= 0.0)

@@ -70,7 +70,7 @@ class Command(Heard):
                         for names, text in OUTPUT]  # fmt: skip
 
 
-class Group(Heard, click.Group):
+class CommandGroup(Heard, click.Group):
     command_class = Command
 
 

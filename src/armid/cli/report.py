@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from armid.cli.options import Group, command, examples, give, of_studies, out_option, plugin_option, present, say
+from armid.cli.options import CommandGroup, command, examples, give, of_studies, out_option, plugin_option, present, say
 from armid.errors import ArmidError
 from armid.registry import load_registry
 from armid.report.result import (
@@ -124,7 +124,7 @@ def kind_in(folder: Path) -> Kind | None:
     raise ArmidError(f"{folder} holds no result: {names} of `{IDENTIFICATION.command}` is expected")
 
 
-@click.group("import", cls=Group, short_help="Make a campaign from public measured data.")
+@click.group("import", cls=CommandGroup, short_help="Make a campaign from public measured data.")
 def import_group() -> None:
     """Make a campaign from public measured data, by studies/measured of the repository (`pip install -e`).
 
@@ -168,7 +168,7 @@ def dfki(folder: Path, out: Path, holdout: str | None, plugins: tuple[str, ...])
     told(of_studies("measured.importers").import_dfki(folder, out, holdout))
 
 
-@click.group("export", cls=Group, short_help="Write stored results for other programs.")
+@click.group("export", cls=CommandGroup, short_help="Write stored results for other programs.")
 def export_group() -> None:
     """Write stored results in the formats of other programs."""
 

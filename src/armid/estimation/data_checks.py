@@ -81,7 +81,7 @@ def data_issues(campaign: Campaign, model: Model, space: Space) -> tuple[DataIss
     times = [s for r in campaign.records for s in of_times(r)]
     if not train:
         return (*seen, *times)
-    trial = Trial(model, space).scaled(train)
+    trial = DataTrial(model, space).scaled(train)
     train = [trial.thinned(r, len(train)) for r in train]
     issues, z = mistakes(trial, train)
     issues = of_two(issues, train)
@@ -107,7 +107,7 @@ def filled(record: Record) -> Record:
     return record.with_signals(lambda signal: replace(signal, data=None))
 
 
-class Trial:
+class DataTrial:
     """Fit one model to records, and tell its errors on them, each as rms of the residual over rms of the signal.
 
     Every step between samples is cut into four: rough enough to be quick, and a clock in another unit costs no more.
@@ -124,14 +124,14 @@ class Trial:
         moved = [r.measured - (np.mean(r.measured) if r.record.unit in ("rad", "m") else 0.0) for r in ready]
         return WeightedRecords(ready, self.space, tuple(1.0 / max(float(np.linalg.norm(x)), 1e-300) for x in moved))
 
-    def scaled(self, records: Sequence[Record]) -> "Trial":
+    def scaled(self, records: Sequence[Record]) -> "DataTrial":
         if not self.model.plant.scales_from_records:
             return self
         model = replace(self.model, plant=scaled_plant(self.model.plant, records, ""))
         old, new = space_of(self.model), space_of(model)
         kept = {n: np.where(getattr(self.space, n) == getattr(old, n), getattr(new, n), getattr(self.space, n))
                 for n in ("low", "high")}  # fmt: skip
-        return Trial(model, replace(self.space, **kept))
+        return DataTrial(model, replace(self.space, **kept))
 
     def errors(self, records: Sequence[Record], Z: Array) -> Array:
         """Return the error of each record at candidates in shares, (n_candidates, n_records), inf where it diverges."""
@@ -216,7 +216,7 @@ class Trial:
         return self.fit(records, np.vstack([spread, *others]), n_best=N_BEST)
 
 
-def mistakes(trial: Trial, train: Sequence[Record]) -> tuple[list[DataIssue], Array]:
+def mistakes(trial: DataTrial, train: Sequence[Record]) -> tuple[list[DataIssue], Array]:
     z, before = trial.fit(train)
     if trial.errors(train, z).max() <= TOLERABLE:
         return [], z
@@ -229,7 +229,7 @@ def mistakes(trial: Trial, train: Sequence[Record]) -> tuple[list[DataIssue], Ar
         tried.append((*own.fit(undone, below=below), correction, own, undone))
     declared = space_of(trial.model)
     if not all(np.array_equal(getattr(declared, n), getattr(trial.space, n), True) for n in ("low", "high", "fixed")):
-        own = Trial(trial.model, declared)
+        own = DataTrial(trial.model, declared)
         tried.append((*own.fit(train), WIDER_BOUNDS, own, tuple(train)))
     # a poor fit of the declared model is not a mistake of the records, and of two corrections the better one is named
     likely = sorted(tried, key=lambda t: t[1])[:N_LIKELY]
@@ -257,7 +257,7 @@ def mistakes(trial: Trial, train: Sequence[Record]) -> tuple[list[DataIssue], Ar
     return issues or everywhere, z
 
 
-def of_few(trial: Trial, train: Sequence[Record], before: float, below: float) -> list[DataIssue]:
+def of_few(trial: DataTrial, train: Sequence[Record], before: float, below: float) -> list[DataIssue]:
     """Return the mistake in one of few records, or the exchange of two, with which the model fits all of them well.
 
     Of two or three records no majority says which are right: each correction is fitted together with the others.
@@ -292,7 +292,7 @@ def of_two(issues: Sequence[DataIssue], train: Sequence[Record]) -> list[DataIss
     return [replace(s, sentence=f"{s.sentence}{doubt}") if s.record and s.kind not in SURE_KINDS else s for s in issues]
 
 
-def changes_of_few(trial: Trial, train: Sequence[Record]) -> Iterator[dict[str, Correction]]:
+def changes_of_few(trial: DataTrial, train: Sequence[Record]) -> Iterator[dict[str, Correction]]:
     """Yield what may be undone in one record, or in two that are exchanged, file -> correction."""
     for record in train:
         others = trial.fit([r for r in train if r is not record])[0]
@@ -304,7 +304,7 @@ def changes_of_few(trial: Trial, train: Sequence[Record]) -> Iterator[dict[str, 
             yield {a.file: told_as(b), b.file: told_as(a)}
 
 
-def agreed(trial: Trial, train: Sequence[Record], z: Array) -> Array:
+def agreed(trial: DataTrial, train: Sequence[Record], z: Array) -> Array:
     """Return the candidate on which most records agree, whatever the others say: sum log(1 + (e/e0)^2) is least."""
     own = [trial.fit([r])[0] for r in train[: 2 * MOST_APART]]
     candidates = np.concatenate([[z], own, trial.spread(train)])
@@ -320,7 +320,7 @@ def typical_of(errors: Array) -> float:
     return float(np.median(np.sort(errors)[: (len(errors) + 1) // 2]))
 
 
-def apart(trial: Trial, record: Record, z: Array, typical: float) -> list[DataIssue]:
+def apart(trial: DataTrial, record: Record, z: Array, typical: float) -> list[DataIssue]:
     """Return the mistake of one record, judged at a candidate that is not fitted to it, none where it is as others."""
     before = float(trial.errors([record], z)[0, 0])
     if before <= max(TOLERABLE, APART_IN_NOISE * typical):
@@ -331,7 +331,7 @@ def apart(trial: Trial, record: Record, z: Array, typical: float) -> list[DataIs
     return chosen(record.file, before, [(e, m) for e, m in tried if m.kind != "time" or e <= LEFT_BY_TWO])
 
 
-def least_nearby(trial: Trial, train: Sequence[Record], record: Record, z: Array) -> float:
+def least_nearby(trial: DataTrial, train: Sequence[Record], record: Record, z: Array) -> float:
     """Return the least error of a held-out record at candidates near by that fit the train records tolerably.
 
     Where next to nothing decides how a machine moves on, as over the top, what they leave open is not a mistake.
@@ -357,7 +357,7 @@ def chosen(record: str, before: float, tried: Iterable[tuple[float, Correction]]
     return [replace(first, sentence=f"{first.sentence}{also}")]
 
 
-def exchanged(trial: Trial, train: Sequence[Record], outside: Sequence[Record], before: float) -> list[DataIssue]:
+def exchanged(trial: DataTrial, train: Sequence[Record], outside: Sequence[Record], before: float) -> list[DataIssue]:
     """Return the two records that each fit the manoeuvre of the other, none where no exchange explains much."""
     tried = []
     for a, b in combinations(outside, 2):
@@ -419,7 +419,7 @@ def every(record: Record, step: int, plant: Plant) -> Record:
     return replace(thinner, manoeuvre=rarer(record.manoeuvre), pieces=(kept,))
 
 
-def begun_elsewhere(trial: Trial, train: Sequence[Record], z: Array) -> Iterator[DataIssue]:
+def begun_elsewhere(trial: DataTrial, train: Sequence[Record], z: Array) -> Iterator[DataIssue]:
     """Yield the angles or positions that in every record begin away from the declared start of the model."""
     plant = trial.model.plant
     away: dict[str, list[tuple[float, str]]] = {}

@@ -50,7 +50,7 @@ EXPLAINS = 0.9
 
 
 @dataclass(frozen=True)
-class Calibration:
+class PriorBeliefs:
     """Hold prior beliefs.
 
     temperature: log evidence is divided by it. expected: kind of hypothesis -> how many of it a campaign has.
@@ -68,5 +68,5 @@ class Calibration:
 
 
 @cache
-def calibration() -> Calibration:
-    return Calibration(**tomllib.loads(files("armid.inference").joinpath("calibration.toml").read_text()))
+def calibration() -> PriorBeliefs:
+    return PriorBeliefs(**tomllib.loads(files("armid.inference").joinpath("calibration.toml").read_text()))

@@ -32,7 +32,7 @@ class KindError(Exception):
 
 
 @dataclass(frozen=True)
-class Kind:
+class ValueKind:
     """Declare a kind of values.
 
     read: returns a value as it is wanted, or raises KindError. schema: the same kind as JSON Schema has it.
@@ -46,12 +46,12 @@ class Kind:
         return self.read(value)
 
 
-def kind(**schema: Any) -> Callable[[Callable[[object], Any]], Kind]:
-    """Make a function that reads a value a Kind; schema: the keywords of JSON Schema."""
-    return lambda read: Kind(read, schema)
+def kind(**schema: Any) -> Callable[[Callable[[object], Any]], ValueKind]:
+    """Make a function that reads a value a ValueKind; schema: the keywords of JSON Schema."""
+    return lambda read: ValueKind(read, schema)
 
 
-def part(kind: Kind, value: object, path: str) -> Any:
+def part(kind: ValueKind, value: object, path: str) -> Any:
     try:
         return kind(value)
     except KindError as error:
@@ -66,7 +66,7 @@ def number(value: object) -> float:
     raise KindError(value)
 
 
-def instance_of(python: type, schema: str) -> Kind:
+def instance_of(python: type, schema: str) -> ValueKind:
     """Return the kind of all values of a type of Python; schema: its name in JSON Schema."""
 
     def read(value: object) -> Any:
@@ -74,10 +74,10 @@ def instance_of(python: type, schema: str) -> Kind:
             return value
         raise KindError(value)
 
-    return Kind(read, {"type": schema})
+    return ValueKind(read, {"type": schema})
 
 
-def tested(kind: Kind, test: Callable[[Any], bool], **schema: Any) -> Kind:
+def tested(kind: ValueKind, test: Callable[[Any], bool], **schema: Any) -> ValueKind:
     """Return a kind of fewer values; schema: how JSON Schema says the test, nothing where it cannot."""
 
     def both(value: object) -> Any:
@@ -86,7 +86,7 @@ def tested(kind: Kind, test: Callable[[Any], bool], **schema: Any) -> Kind:
             return accepted
         raise KindError(value)
 
-    return Kind(both, {**kind.schema, **schema})
+    return ValueKind(both, {**kind.schema, **schema})
 
 
 any_text, boolean = instance_of(str, "string"), instance_of(bool, "boolean")
@@ -97,23 +97,23 @@ probability = tested(number, lambda value: 0.0 < value < 1.0, exclusiveMinimum=0
 text = tested(any_text, bool, minLength=1)
 
 
-def name_in(catalogue: str) -> Kind:
+def name_in(catalogue: str) -> ValueKind:
     """Return the kind of names of a catalogue; JSON Schema offers those that are registered and takes others."""
-    return Kind(text.read, {**text.schema, REGISTERED: catalogue})
+    return ValueKind(text.read, {**text.schema, REGISTERED: catalogue})
 
 
-def one_of(*words: str) -> Kind:
+def one_of(*words: str) -> ValueKind:
     return tested(text, lambda word: word in words, enum=list(words))
 
 
-def table_of(inner: Kind) -> Kind:
+def table_of(inner: ValueKind) -> ValueKind:
     def read(value: object) -> dict[str, Any]:
         return {name: part(inner, v, f".{name}") for name, v in any_table(value).items()}
 
-    return Kind(read, {"type": "object", "additionalProperties": inner.schema})
+    return ValueKind(read, {"type": "object", "additionalProperties": inner.schema})
 
 
-def one_kind(*kinds: Kind) -> Kind:
+def one_kind(*kinds: ValueKind) -> ValueKind:
     """Return the kind of what is of the first of several kinds that fits."""
 
     def read(value: object) -> Any:
@@ -122,20 +122,20 @@ def one_kind(*kinds: Kind) -> Kind:
                 return each(value)
         return kinds[-1](value)
 
-    return Kind(read, {"anyOf": [each.schema for each in kinds]})
+    return ValueKind(read, {"anyOf": [each.schema for each in kinds]})
 
 
-def list_of(inner: Kind, shortest: int = 0, longest: float = inf) -> Kind:
+def list_of(inner: ValueKind, shortest: int = 0, longest: float = inf) -> ValueKind:
     def read(value: object) -> tuple[Any, ...]:
         if not isinstance(value, list) or not shortest <= len(value) <= longest:
             raise KindError(value)
         return tuple(part(inner, v, f".{i}") for i, v in enumerate(value))
 
     most = {"maxItems": longest} if longest < inf else {}
-    return Kind(read, {"type": "array", "items": inner.schema, "minItems": shortest, **most})
+    return ValueKind(read, {"type": "array", "items": inner.schema, "minItems": shortest, **most})
 
 
-def key(kind: Kind, expected: str, meaning: str) -> dict[str, Any]:
+def key(kind: ValueKind, expected: str, meaning: str) -> dict[str, Any]:
     """Return the metadata of a field of a sheet: its kind, the kind in words, and the meaning of the value."""
     return {"kind": kind, "expected": expected, "meaning": meaning}
 
@@ -144,9 +144,9 @@ def key(kind: Kind, expected: str, meaning: str) -> dict[str, Any]:
 REGISTERED, OF_PLANTS = "x-registered", "x-of-plants"
 
 
-def table_for(sheet: "type[DataclassInstance]") -> Kind:
+def table_for(sheet: "type[DataclassInstance]") -> ValueKind:
     """Return the kind of tables that a sheet declares; `validated` looks into each of them later."""
-    return Kind(any_table.read, sheet_schema(sheet))
+    return ValueKind(any_table.read, sheet_schema(sheet))
 
 
 def sheet_schema(sheet: "type[DataclassInstance]") -> dict[str, Any]:
@@ -287,7 +287,8 @@ class CampaignSheet:
         metadata=key(above_zero, "a range in deg/s above 0", "Range of the gyro; speeds beyond it are cut off."),
     )
     parameters: Mapping[str, dict[str, Any]] = field(default_factory=dict, metadata=key(
-        Kind(table_of(any_table).read, table_of(one_kind(table_for(Override), table_of(table_for(Override)))).schema),
+        ValueKind(table_of(any_table).read,
+                  table_of(one_kind(table_for(Override), table_of(table_for(Override)))).schema),
         "a table of low, high, fixed", "What replaces the declaration of a parameter, SI.",
     ))  # fmt: skip
     constants: Mapping[str, float] = field(default_factory=dict, metadata=CONSTANTS_KEY)

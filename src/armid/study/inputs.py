@@ -93,7 +93,7 @@ class Prbs(Steps):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Column:
+class InputColumn:
     """A column of a CSV file in the folder of the study, its times from the first sample on."""
 
     csv: str = field(metadata=key(text, "a file in the folder of the study", "The CSV file."))
@@ -126,13 +126,13 @@ def kept(table: Any, folder: Path, times: Array, where: str) -> dict[str, Any]:
     if not isinstance(table, dict) or ("kind" in table) == ("csv" in table):
         raise ArmidError(f"{where}: `kind` or `csv` is expected, one of them")
     if "csv" in table:
-        return {"values": column_values(validated(Column, table, where), folder, times, where)}
+        return {"values": column_values(validated(InputColumn, table, where), folder, times, where)}
     if table["kind"] not in SIGNALS:
         raise ArmidError(f"{where}: kind '{table['kind']}' is unknown: {nearest(str(table['kind']), SIGNALS)}")
     return asdict(validated(SIGNALS[table["kind"]], table, where))
 
 
-def column_values(asked: Column, folder: Path, times: Array, where: str) -> list[float]:
+def column_values(asked: InputColumn, folder: Path, times: Array, where: str) -> list[float]:
     path = (folder / asked.csv).resolve()
     if not path.is_relative_to(folder.resolve()):
         raise ArmidError(f"{where}: {asked.csv} leads out of the folder of the study, a file inside is expected")

@@ -15,7 +15,7 @@ from armid.record.schema import (
     CONSTANTS_KEY,
     EFFECTS_KEY,
     PLANT,
-    Kind,
+    ValueKind,
     above_zero,
     any_table,
     any_text,
@@ -55,7 +55,7 @@ MOST_SEEDS, MOST_CASES = 10**6, 10**5
 integer = tested(instance_of(int, "integer"), lambda value: not isinstance(value, bool))
 
 
-def whole_number(least: int = 0, most: int = LARGEST_COUNT) -> Kind:
+def whole_number(least: int = 0, most: int = LARGEST_COUNT) -> ValueKind:
     return tested(integer, lambda value: least <= value <= most, minimum=least, maximum=most)
 
 
@@ -76,10 +76,10 @@ def seeds(value: object) -> tuple[int, ...]:
     return tuple(range(1, whole_number(1, MOST_SEEDS)(value) + 1))
 
 
-def one_or_more(kind: Kind) -> Kind:
+def one_or_more(kind: ValueKind) -> ValueKind:
     """Return a kind of lists; one value is taken as a list of it."""
     several = list_of(kind, 1)
-    return Kind(lambda value: several(value) if isinstance(value, list) else (kind(value),),
+    return ValueKind(lambda value: several(value) if isinstance(value, list) else (kind(value),),
                 {"anyOf": [kind.schema, several.schema]})  # fmt: skip
 
 
@@ -87,7 +87,7 @@ rising_counts = tested(one_or_more(count), lambda counts: list(counts) == sorted
 
 
 # -0.0 is 0 and is to be written like it
-plain_zero = Kind(lambda value: number(value) + 0.0, number.schema)
+plain_zero = ValueKind(lambda value: number(value) + 0.0, number.schema)
 at_least_zero = tested(plain_zero, lambda value: value >= 0.0, minimum=0)
 
 
@@ -152,12 +152,12 @@ SEED_KEY = key(any_whole, "a whole number of at least 0", "Seed of what is drawn
 
 def kind_key(name: str) -> dict[str, Any]:
     return key(
-        Kind(text.read, {"const": name}), "the kind of a study", "'close_loop' for campaigns whose loop is closed."
+        ValueKind(text.read, {"const": name}), "the kind of a study", "'close_loop' for campaigns whose loop is closed."
     )
 
 
 def report_key(names: tuple[str, ...]) -> dict[str, Any]:
-    return key(Kind(any_text.read, {"enum": list(names)}), f"one of {', '.join(map(repr, names))}",
+    return key(ValueKind(any_text.read, {"enum": list(names)}), f"one of {', '.join(map(repr, names))}",
                "Which report is made; without one the sections that fit.")  # fmt: skip
 
 
