@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from armid.inference.decisions import MOVES, calibration
@@ -29,6 +30,10 @@ PLAUSIBLE = {"late": 0.05, "clock": 0.02, "offset": 0.05, "drift": 0.1, "gain": 
 OF_SENSOR, OF_TIMES = ("offset", "drift", "gain"), ("late", "clock")
 # Samples on either side from which one between them is made.
 SIDE_SAMPLES = 32
+# Places are told apart to so many digits of a sample: rounding is below, steps of differences are far above.
+DIGITS_OF_PLACE = 10
+# So few different weights are those of a late record.
+FEW_PLACES = 8
 # Share of the largest plausible size over which differences are taken.
 FAULT_STEP = 1e-3
 
@@ -91,8 +96,8 @@ class Fault:
             return 2.0 * record.measured.size * float(np.log(abs(1.0 + value)))
         if self.kind not in OF_TIMES:
             return 0.0
-        _, weights = sinc_weights(len(record.measured), self.places(record, value))
-        return float(sum(self.lost(record, value)) + np.sum(1.0 - np.sum(weights**2, axis=1)))
+        _, weights, which = sinc_weights(len(record.measured), self.places(record, value))
+        return float(sum(self.lost(record, value)) + np.sum((1.0 - np.sum(weights**2, axis=1))[which]))
 
     def places(self, record: Record, value: float) -> Array:
         """Return where in its samples a record holds those of its true times, (n_samples,)."""
@@ -122,18 +127,29 @@ def resampled(signal: Array, places: Array) -> Array:
     A spline would smooth it, and what is left would no longer look like the noise of the sensor. places: in samples.
     """
     padded = np.pad(signal, SIDE_SAMPLES, mode="reflect", reflect_type="odd")
-    near, weights = sinc_weights(len(signal), places)
-    return np.asarray(np.sum(padded[near + SIDE_SAMPLES] * weights, axis=1))
+    begin, weights, which = sinc_weights(len(signal), places)
+    if len(weights) > FEW_PLACES:
+        near = sliding_window_view(padded, 2 * SIDE_SAMPLES)[begin + 1]
+        return np.asarray(np.einsum("ij,ij->i", near, weights[which]))
+    there = np.empty(len(places))
+    for i, row in enumerate(weights):
+        mine = which == i
+        there[mine] = np.correlate(padded, row, "valid")[begin[mine] + 1]
+    return there
 
 
-def sinc_weights(n: int, places: Array) -> tuple[NDArray[np.int64], Array]:
-    """Return for each place which of n samples are near, and what each weighs, (n_places, 2 SIDE_SAMPLES) both."""
+def sinc_weights(n: int, places: Array) -> tuple[NDArray[np.int64], Array, NDArray[np.int64]]:
+    """Return the sample before each place, weights of the samples near, and which of them are those of each place.
+
+    Weights: (n_weights, 2 SIDE_SAMPLES). They depend on the distance to the sample before alone, which in a late record
+    is the same at all places but its ends.
+    """
     inside = np.clip(places, 0.0, n - 1.0)
-    first = np.minimum(np.floor(inside), n - 2.0).astype(np.int64) - SIDE_SAMPLES + 1
-    near = first[:, np.newaxis] + np.arange(2 * SIDE_SAMPLES)
-    away = inside[:, np.newaxis] - near
+    begin = np.minimum(np.floor(inside), n - 2.0)
+    parts, which = np.unique(np.round(inside - begin, DIGITS_OF_PLACE), return_inverse=True)
+    away = parts[:, np.newaxis] - (np.arange(2 * SIDE_SAMPLES) - SIDE_SAMPLES + 1)
     weights = np.sinc(away) * np.cos(0.5 * np.pi * away / SIDE_SAMPLES) ** 2
-    return near, weights / np.sum(weights, axis=1, keepdims=True)
+    return begin.astype(np.int64), weights / np.sum(weights, axis=1, keepdims=True), which
 
 
 def faults_of(base: WhiteRecords, index: int) -> Iterator[Fault]:
