@@ -26,7 +26,7 @@ from calibration.campaigns import HIDDEN, MACHINE, PLANTS, Task, campaign_of, fi
 
 KEPT = ("version", "verdict", "also", "effects", "steps", "suspects", "withdrawn", "error", "parameters",
         "probabilities")  # fmt: skip
-# After so many campaigns a process begins afresh: what is compiled for each machine is kept in its memory.
+# After so many campaigns a process begins afresh, so that what it keeps of them is freed.
 TASKS_OF_PROCESS = 20
 # Models of a smaller weight are not kept.
 LEAST = 1e-5
