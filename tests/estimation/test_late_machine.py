@@ -112,6 +112,10 @@ def test_an_estimate_does_not_stop_where_whole_samples_make_chi2_jump(tmp_path):
         assert np.all(np.abs(x - [DRUM, FRICTION, late * INTERVAL]) <= 4.0 * sd), delay
         assert 1e-3 * INTERVAL < sd[2] < 0.1 * INTERVAL
         chi2 = weighted_records(ready, space, [1.0 / 0.1])
+        low, high = chi2.walls(chi2.shares(np.array([DRUM, FRICTION, 0.0])))
+        # no delay is a bound, and a fit may leave it
+        assert (low == 0.0).all()
+        assert (high == 1.0).all()
         assert chi2.chi2(chi2.shares(x))[0] < 1.2 * len(u)
 
 

@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from pathlib import Path
 from threading import Lock
 from typing import TypeVar
@@ -97,8 +98,8 @@ class LeastSquaresProblem:
         return np.where(np.isfinite(total), total, np.inf)
 
     @cached_property
-    def jumps(self) -> list[tuple[int, Array]]:
-        """The places of free delays, and at which shares of the range chi2 jumps in them.
+    def jumps(self) -> list[tuple[int, Array, float]]:
+        """Where chi2 jumps: place of a free delay, shares inside its range, (n_jumps,), and how far these are apart.
 
         A held input that is late by whole samples jumps at a sample, which shows it or not.
         """
@@ -107,32 +108,33 @@ class LeastSquaresProblem:
         grids = [piece.manoeuvre for r in self.replays for piece in r.pieces] if delays else []
         held = {m.interval for m in grids if any((i.hold or m.hold) == "zero" for i in self.model.plant.inputs)}
         low, high = self.space.low[self.space.free], self.space.high[self.space.free]
-        return [(i, (t * np.arange(np.ceil(low[i] / t), high[i] // t + 1) - low[i]) / (high[i] - low[i]))
-                for i in delays for t in held]  # fmt: skip
+        jumps = []
+        for i, interval in product(delays, held):
+            late_by = interval * np.arange(low[i] // interval + 1.0, np.ceil(high[i] / interval))
+            if late_by.size:
+                jumps.append((i, (late_by - low[i]) / self.span[i], float(interval / self.span[i])))
+        return jumps
+
+    def nearest_jumps(self, z: Array) -> list[tuple[int, float, float]]:
+        """Return the place of each delay, the jump that is next to it, and how far these are apart."""
+        return [(i, float(edges[np.argmin(np.abs(edges - z[i]))]), apart) for i, edges, apart in self.jumps]
 
     def walls(self, z: Array) -> tuple[Array, Array]:
         """Return the shares between which a step stays, (n_free,) each: no delay steps over a jump next to it."""
         low, high = np.zeros(len(z)), np.ones(len(z))
-        for i, edges in self.jumps:
-            if len(edges) < 2:
-                continue
-            apart, edge = edges[1] - edges[0], edges[int(np.argmin(np.abs(edges - z[i])))]
+        for i, edge, apart in self.nearest_jumps(z):
             if 0.0 < edge - z[i] + OFF_JUMP * apart < NEXT_TO_JUMP * apart:
                 high[i] = min(high[i], edge - OFF_JUMP * apart)
             elif 0.0 < z[i] - edge < NEXT_TO_JUMP * apart:
                 low[i] = max(low[i], edge + OFF_JUMP * apart)
         return low, np.maximum(high, low)
 
-    def across(self, z: Array) -> list[Array]:
-        """Return the candidates on both sides of the jump that is next to each delay of one."""
-        sides = []
-        for i, edges in self.jumps:
-            if len(edges) > 1:
-                apart, edge = edges[1] - edges[0], edges[int(np.argmin(np.abs(edges - z[i])))]
-                for off in (-OFF_JUMP, OFF_JUMP):
-                    side = z.copy()
-                    side[i] = np.clip(edge + off * apart, 0.0, 1.0)
-                    sides.append(side)
+    def across(self, z: Array) -> Array:
+        """Return the candidates on both sides of the jump that is next to each delay of one, (n_candidates, n_free)."""
+        ends = [(i, edge + off * apart) for i, edge, apart in self.nearest_jumps(z) for off in (-OFF_JUMP, OFF_JUMP)]
+        sides = np.tile(z, (len(ends), 1))
+        for side, (i, end) in zip(sides, ends, strict=True):
+            side[i] = end
         return sides
 
     def residual_and_slopes(self, z: Array) -> tuple[Array, Array]:
@@ -146,11 +148,8 @@ class LeastSquaresProblem:
         low, high = self.walls(z)
         for i in np.flatnonzero(~np.isfinite(slopes).all(axis=1) | (low > 0.0) | (high < 1.0)):
             shift = float(np.clip(z[i], STEP, 1.0 - STEP) - z[i])
-            sides = [
-                ((signals[1 + i], shift + STEP), high[i] < 1.0),
-                ((signals[1 + n + i], shift - STEP), low[i] > 0.0),
-            ]
-            quotients = [(signal - here) / step for (signal, step), is_over in sides
+            sides = ((signals[1 + i], shift + STEP, high[i] < 1.0), (signals[1 + n + i], shift - STEP, low[i] > 0.0))
+            quotients = [(signal - here) / step for signal, step, is_over in sides
                          if step != 0.0 and not is_over and np.isfinite(signal).all()]  # fmt: skip
             slopes[i] = quotients[0] if quotients and np.isfinite(here).all() else 0.0
         return np.asarray(self.measured - here), np.ascontiguousarray(slopes.T)
@@ -327,15 +326,15 @@ def descend(
 
     Levenberg-Marquardt with steps cut at the box, which hold what the box holds (More 1978, doi:10.1007/BFb0067700).
     tolerance: relative fall of chi2 in one step at which a start has arrived. central: take slopes from central
-    differences, at twice the price. limit: chi2 that must be in reach, see REACH_OF_PATH; what
-    gives up is where it was then. most: steps.
+    differences, at twice the price. limit: chi2 that must be in reach, see REACH_OF_PATH; what gives
+    up is where it was then. most: steps.
     """
     best = descended(records, np.clip(np.array(starts), 0.0, 1.0), tolerance, central, limit, most)
-    while sides := records.across(best.z):
-        chi2 = records.chi2(np.array(sides))
+    while len(sides := records.across(best.z)):
+        chi2 = records.chi2(sides)
         if not chi2.min() < best.chi2 * (1.0 - tolerance):
             break
-        best = descended(records, np.array(sides)[[int(np.argmin(chi2))]], tolerance, central, limit, most)
+        best = descended(records, sides[[int(np.argmin(chi2))]], tolerance, central, limit, most)
     return best.z
 
 
@@ -360,15 +359,15 @@ def advance(
     records: LeastSquaresProblem, paths: Sequence[Descent], tolerance: float, central: bool, limit: float
 ) -> None:
     slopes = [records.residual_and_slopes(p.z)[1] for p in paths] if central else forward_slopes(records, paths)
-    left = [(p, j.T @ j, j.T @ p.residual) for p, j in zip(paths, slopes, strict=True)]
-    for path, square, slope in left if not central else ():
-        falls = promised_fall(square, slope, path.z, records.walls(path.z))
+    left = [(p, j.T @ j, j.T @ p.residual, records.walls(p.z)) for p, j in zip(paths, slopes, strict=True)]
+    for path, square, slope, walls in left if not central else ():
+        falls = promised_fall(square, slope, path.z, walls)
         path.done = falls <= tolerance * path.chi2 or path.chi2 - REACH_OF_PATH * falls > limit
     left = [one for one in left if not one[0].done]
     while left:
         dampings = [[max(f * p.damping, LEAST_DAMPING) for f in LADDER] for p, *_ in left]
-        tried = [[step_in_box(square, slope, p.z, d, records.walls(p.z)) for d in ds]
-                 for (p, square, slope), ds in zip(left, dampings, strict=True)]  # fmt: skip
+        tried = [[step_in_box(square, slope, p.z, d, walls) for d in ds]
+                 for (p, square, slope, walls), ds in zip(left, dampings, strict=True)]  # fmt: skip
         residuals = records.residuals(np.concatenate(tried)).reshape(len(left), len(LADDER), -1)
         left = [one for one, z, r, d in zip(left, tried, residuals, dampings, strict=True)
                 if not taken(one[0], z, r, d, tolerance)]  # fmt: skip

@@ -99,7 +99,7 @@ class ProjectedRecords(LeastSquaresProblem):
         return Cover.of(self.columns)
 
     @property
-    def jumps(self) -> list[tuple[int, Array]]:
+    def jumps(self) -> list[tuple[int, Array, float]]:
         return self.records.jumps
 
     @cached_property
