@@ -7,7 +7,7 @@ import pytest
 from few_candidates import CANDIDATES, COMMON, TRUTH
 
 from armid.inference.candidates import bump_at
-from armid.inference.missing_signal import dependences, missing_signal, motions, segments
+from armid.inference.kinds.missing_signal import dependences, missing_signal, motions, segments
 from armid.loop import close_loop, report_of
 from armid.loop.document import conclusion, details_of
 from armid.loop.figures import figures_of

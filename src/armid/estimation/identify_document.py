@@ -82,10 +82,10 @@ def identify_document(
     errors = error_table("Errors", ["records"], pooled, unit, ERROR_NOTE)
     rows = [(file, e["role"], e) for file, e in by_file.items()]
     by_record = error_table("Each record", ["record", "role"], rows, unit)
-    said = [text for text in details["remarks"] if text not in details["warnings"]]
-    first = [text for text in details["known_first"] if text in said]
+    texts = [text for text in details["remarks"] if text not in details["warnings"]]
+    first = [text for text in details["known_first"] if text in texts]
     correlated = correlation_tables(result["correlation"])
-    rest = [text for text in said if text not in first]
+    rest = [text for text in texts if text not in first]
     remarks = titled({"What must be known": first, "For the record": rest})
     value = result["fitness_value"]
     search = [
@@ -248,22 +248,24 @@ def details_of(identification: Identification) -> dict[str, Any]:
 def ranked(identification: Identification) -> list[str]:
     """Return what stands against the result, the most important first, one sentence each."""
     information = identification.information
-    said = [s.sentence for s in identification.issues] + convergence_remarks(identification)
-    said += [bound_remark(identification, int(i)) for i in np.flatnonzero(identification.at_bound)]
-    said += misfit_remarks(identification)
+    texts = [s.sentence for s in identification.issues] + convergence_remarks(identification)
+    texts += [bound_remark(identification, int(i)) for i in np.flatnonzero(identification.at_bound)]
+    texts += misfit_remarks(identification)
     deviations = zip(information.names, information.deviation, strict=True)
-    said += [f"{name} is not determined by these records." for name, d in deviations if not np.isfinite(d)]
+    texts += [f"{name} is not determined by these records." for name, d in deviations if not np.isfinite(d)]
     pairs = collinear(information)
     if pairs:
         text = ", ".join(f"{a} and {b} {r:+.3f}" for a, b, r in pairs)
-        said.append(f"Hardly to be told apart on these records (correlation): {text}; a change of one is made up for "
+        texts.append(f"Hardly to be told apart on these records (correlation): {text}; a change of one is made up for "
                     "by the other.")  # fmt: skip
     if identification.n_failed:
-        said.append(f"{identification.n_failed} of {identification.used} candidates diverged and were given a penalty.")
+        texts.append(
+            f"{identification.n_failed} of {identification.used} candidates diverged and were given a penalty."
+        )
     # that probes elsewhere miss the accuracy says nothing about the estimate
     coarse = [r for r in identification.replays if not all(c.reached for c in r.calibrations)]
     off = {r: r.engine_error_at(identification.candidate) for r in coarse}
-    return said + bootstrap_remarks(identification) + [
+    return texts + bootstrap_remarks(identification) + [
         "{}: the engine is off by up to {:.2g} {} at the estimate, even at its finest steps: the equations change too "
         "fast there, or switch somewhere without a guard.".format(r.name, *shown(error, r.record.unit))
         for r, error in off.items() if error > r.record.noise.rms / NOISE_HIDES
@@ -293,34 +295,34 @@ def bound_remark(identification: Identification, i: int) -> str:
 
 
 def convergence_remarks(identification: Identification) -> list[str]:
-    said = []
+    texts = []
     if identification.is_far_from_minimum:
         steps = np.abs(np.nan_to_num(identification.information.step))
         name = identification.information.names[int(np.argmax(steps))]
         of, better = "least-squares minimum", "Identifier least_squares on fitness rmse, a"
         if identification.scatter is not None:
             of, better = f"minimum of {identification.fitness.name}", "A"
-        said.append(f"The search has not come to the {of}: a step from here would move {name} by {steps.max():.3g} of "
+        texts.append(f"The search has not come to the {of}: a step from here would move {name} by {steps.max():.3g} of "
                     f"its standard deviations, so the intervals do not hold. {better} larger budget or another seed "
                     "may get there.")  # fmt: skip
     train, unseen = identification.train.chi2_per_sample, identification.holdout
     holdout = None if unseen is None else unseen.chi2_per_sample
     if train is not None and holdout is not None and holdout > CARRIES_OVER * max(train, 1.0):
-        said.append(f"The fit does not carry over: its mean square is {holdout:.3g} times that of the noise on the "
+        texts.append(f"The fit does not carry over: its mean square is {holdout:.3g} times that of the noise on the "
                     f"held-out records, {train:.3g} times on those fitted.")  # fmt: skip
-    return said
+    return texts
 
 
 def noise_remarks(identification: Identification) -> list[str]:
     replays = identification.train_replays
-    said = [noise_remark(r) for r in replays if len(replays) <= MOST_REMARKS]
-    for output in dict.fromkeys(r.record.output for r in replays if not said):
+    texts = [noise_remark(r) for r in replays if len(replays) <= MOST_REMARKS]
+    for output in dict.fromkeys(r.record.output for r in replays if not texts):
         of = [r.record for r in replays if r.record.output == output]
         values = [shown(record.noise.rms, record.unit)[0] for record in of]
         name = f"{output}, {len(of)} records" if len(of) < len(replays) else f"{len(of)} records"
         unit = shown(0.0, of[0].unit)[1]
-        said.append(f"{name}: noise {min(values):.3g} to {max(values):.3g} {unit} rms.")
-    return said
+        texts.append(f"{name}: noise {min(values):.3g} to {max(values):.3g} {unit} rms.")
+    return texts
 
 
 def misfit_remarks(identification: Identification) -> list[str]:

@@ -15,8 +15,6 @@ search        which models are fitted; `moves`: from one model to its neighbours
 posterior     probabilities of hypotheses and sets; intervals that count what may be missing
 checks        whether a residual is more than noise, and where
 carry_over    what a model predicts of what its fit has not seen: records held out, parts left out in turn
-
-Also here: missing_signal (the signal that a model lacks at each port).
 """
 
 from armid.inference.infer import Inference, infer, prepared

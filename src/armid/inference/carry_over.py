@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from armid.estimation.corrections import rms
 from armid.estimation.least_squares import descend
 from armid.inference.checks import Residuals
 from armid.inference.decisions import EXPLAINS, NOT_CARRIED, OUTSIDE, OVER_NOISE
@@ -75,13 +76,12 @@ def in_doubt_sentences(train: Residuals, holdout: Residuals | None) -> list[str]
     """Return which held-out records are missed by far more than the train records, as far as the doubt lets them be."""
     if holdout is None:
         return []
-    outputs, words = [o.name for o in holdout.model.plant.outputs], []
+    outputs, words, noise = [o.name for o in holdout.model.plant.outputs], [], least_noise(train, holdout)
     for replay, raw, part in zip(holdout.replays, holdout.raw, holdout.data.by_record(holdout.residual), strict=True):
-        error = float(np.sqrt(np.mean(raw**2)))
-        least = least_noise(train, holdout)[outputs[replay.place]]
-        if error > NOT_CARRIED * least and float(np.sqrt(np.mean(part**2))) <= NOT_CARRIED:
-            words.append(f"{replay.name} by {shown(error, replay.record.unit)[0]:.3g} "
-                         f"{shown(error, replay.record.unit)[1]} ({error / least:.3g} times)")  # fmt: skip
+        error, least = rms(raw), noise[outputs[replay.place]]
+        if error > NOT_CARRIED * least and rms(part) <= NOT_CARRIED:
+            size, unit = shown(error, replay.record.unit)
+            words.append(f"{replay.name} by {size:.3g} {unit} ({error / least:.3g} times)")
     if not words:
         return []
     return [f"Held-out records are missed by far more than train records: {', '.join(words)}. Their starts and the "
@@ -99,12 +99,12 @@ def missed_records(fit: Fit, train: Residuals, holdout: Residuals | None) -> lis
     for i, (replay, raw) in enumerate(zip(holdout.replays, holdout.raw, strict=True)):
         inside = slice(int(edges[i]), int(edges[i + 1]))
         # Divided by noise and doubt together: the start of a held-out record is known from few samples.
-        factor = float(np.sqrt(np.mean(holdout.residual[inside] ** 2))) / known.get(replay.place, 1.0)
+        factor = rms(holdout.residual[inside]) / known.get(replay.place, 1.0)
         if not np.isfinite(factor) or factor <= NOT_CARRIED:
             continue
         output = outputs[replay.place]
         before = train.errors.outputs[output].rmse if output in train.errors.outputs else holdout.noise_of[output]
-        missed.append(Missed(replay.name, factor, (float(np.sqrt(np.mean(raw**2))), before), replay.record.unit,
+        missed.append(Missed(replay.name, factor, (rms(raw), before), replay.record.unit,
                              outside(train, holdout, inside), changes(fit, holdout, inside)))  # fmt: skip
     return missed
 
@@ -114,7 +114,7 @@ def over_noise(train: Residuals, holdout: Residuals) -> list[bool]:
     outputs, flags = [o.name for o in train.model.plant.outputs], dict[str, bool]()
     least = least_noise(train, holdout)
     for replay, raw in zip(holdout.replays, holdout.raw, strict=True):
-        is_noise = float(np.sqrt(np.mean(raw**2))) <= OVER_NOISE * least[outputs[replay.place]]
+        is_noise = rms(raw) <= OVER_NOISE * least[outputs[replay.place]]
         flags[replay.record.file] = flags.get(replay.record.file, False) or not is_noise
     return list(flags.values())
 
@@ -122,13 +122,13 @@ def over_noise(train: Residuals, holdout: Residuals) -> list[bool]:
 def least_noise(train: Residuals, holdout: Residuals) -> dict[str, float]:
     """Return the least that the noise of each output held out can be, rms: it may be known from differences alone."""
     seen = train.errors.outputs
-    return {n: max(rms, seen[n].rmse if n in seen else 0.0) for n, rms in holdout.noise_of.items()}
+    return {n: max(level, seen[n].rmse if n in seen else 0.0) for n, level in holdout.noise_of.items()}
 
 
 def rms_of(seen: Residuals, place: int) -> float:
     """Return the rms of the whitened residual of one output."""
     parts = zip(seen.data.by_record(seen.residual), seen.replays, strict=True)
-    return float(np.sqrt(np.mean(np.concatenate([part for part, replay in parts if replay.place == place]) ** 2)))
+    return rms(np.concatenate([part for part, replay in parts if replay.place == place]))
 
 
 def outside(train: Residuals, holdout: Residuals, inside: slice) -> dict[str, tuple[float, float, str]]:

@@ -12,6 +12,7 @@ import numpy as np
 from armid.engine import along
 from armid.errors import ArmidError, nearest
 from armid.estimation.constants import NAMED
+from armid.estimation.corrections import rms
 from armid.estimation.information import NORMAL_95
 from armid.estimation.input_noise import estimated, pooled_noise
 from armid.estimation.least_squares import Estimates, descend, held_by_bound, spread_starts, with_fitted_starts
@@ -371,7 +372,7 @@ def matters(library: Library, fit: Fit) -> bool:
 def moved_and_left(library: Library, fit: Fit) -> list[tuple[NoiseModel, float]]:
     """Return of each signal its noise and what a model leaves of it, rms [its unit]."""
     pairs = zip(library.data.levels, train_residuals(fit).raw, strict=True)
-    return [(level, float(np.sqrt(np.mean(left**2)))) for level, left in pairs]
+    return [(level, rms(left)) for level, left in pairs]
 
 
 def inferred(library: Library, declared: Fit) -> Inference:

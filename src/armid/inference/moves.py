@@ -206,7 +206,7 @@ def near(
     limit: float = np.inf,
 ) -> Fit | None:  # fmt: skip
     """Fit a model with some effects from the best of several guesses, its further unknowns as in another fit."""
-    problem = effects.beside(fit, active, library)
+    problem = effects.records_with(fit, active, library)
     starts = [start_of(problem, values) for values in guesses]
     if len(starts) > 1:
         starts = [starts[int(np.argmin(projected(fit, problem, weight).chi2(np.array(starts))))]]

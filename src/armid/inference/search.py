@@ -347,5 +347,5 @@ def reshaped(fit: Fit, key: EffectKey, library: Library) -> Fit:
     if not fit.others:
         return finished(with_free_shapes(fit, key, library), library)
     active = freed_shape(fit.active, key)
-    wide = with_free_shapes(fit, key, library, effects.beside(fit, active, library))
+    wide = with_free_shapes(fit, key, library, effects.records_with(fit, active, library))
     return finished(replace(wide, others=fit.others, base=effects.base_of(fit, active, library)), library)

@@ -21,8 +21,8 @@ from armid.inference.checks import holdout_residuals, is_significant, train_resi
 from armid.inference.decisions import CLAIMED, DENIED, MENTIONED, OVER_NOISE, WINDOW, WITHIN
 from armid.inference.hypothesis import Hypotheses, Hypothesis, words
 from armid.inference.infer import Inference, infer, prepared
+from armid.inference.kinds.missing_signal import Missing, missing_from
 from armid.inference.library import Library, calibrated_replays
-from armid.inference.missing_signal import Missing, missing_from
 from armid.inference.model import (
     Fit,
     accurate_enough,
@@ -170,8 +170,8 @@ def close_loop(
     told_first = dict.fromkeys(s.sentence for s in issues if s.kind in TOLD or (at_a_loss and s.kind != "unjudged"))
     again = [f"Record {s.record} once more, or look at how it was made." for s in suspects if s.kind != "trend"]
     doubt = [] if after.fails_to_carry_over else in_doubt_sentences(after.train, after.holdout)
-    said = (*told_first, *missed_sentences(after.missed), *doubt, *limits_of(after), *dict.fromkeys(again))
-    return ClosedLoop(campaign, verdicts[0], verdicts[1:], before, after, steps[:kept], withdrawn, advice, said,
+    next_steps = (*told_first, *missed_sentences(after.missed), *doubt, *limits_of(after), *dict.fromkeys(again))
+    return ClosedLoop(campaign, verdicts[0], verdicts[1:], before, after, steps[:kept], withdrawn, advice, next_steps,
                       known_together(in_force, inference.exploration.library), tuple(suspects), errors, inference,
                       missing)  # fmt: skip
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from armid.errors import ArmidError
+from armid.estimation.corrections import rms
 from armid.estimation.identify import versions_of
 from armid.estimation.identify_document import PACKAGES_OF_IDENTIFY
 from armid.estimation.information import NORMAL_95
@@ -16,7 +17,7 @@ from armid.inference.checks import Finding, Residuals, time_in_words
 from armid.inference.decisions import EXPLAINS, LISTED, OVER_NOISE, SIGNIFICANCE
 from armid.inference.hypothesis import words
 from armid.inference.infer import Inference, sentence_of
-from armid.inference.missing_signal import Missing
+from armid.inference.kinds.missing_signal import Missing
 from armid.inference.model import Fit
 from armid.inference.posterior import UNSEEN
 from armid.loop.figures import figures_of, record_figure
@@ -138,7 +139,7 @@ def loop_document(
     steps: tuple[Part, ...] = (step_table(report),) if report["steps"] else ()
     steps += (Sentences((details["declared_by"],)),) if details.get("declared_by") else ()
     shifts = (*details["suspects"], *details["shifts"])
-    together = tuple(f"{said[0].upper()}{said[1:]}." for said in report["known_together"])
+    together = tuple(f"{sentence[0].upper()}{sentence[1:]}." for sentence in report["known_together"])
     missing, words = tuple(details["missing"]), details["advice"]
     advice = tuple(advice_sentence(a, text) for a, text in zip(report["advice"][:1], words, strict=False))
     advice += tuple(report["next_steps"])
@@ -183,12 +184,12 @@ def answer(report: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, 
     exact = report["taken_as_exact"]
     names = ", ".join(exact[:MOST_EXACT]) + (f" and {len(exact) - MOST_EXACT} more" if exact[MOST_EXACT:] else "")
     given = f", with {names} taken as exact (no tolerance is declared)" if exact else ""
-    said = [f"To be trusted{given}: {', '.join(sure)}."] if sure else []
+    texts = [f"To be trusted{given}: {', '.join(sure)}."] if sure else []
     also = [VERDICTS[word].lower() for word in report["also"]]
     second += f" Also: {', '.join(also)}." if also else ""
-    said += details["doubts"]
+    texts += details["doubts"]
     return (f"{chances_sentence(report)}.", second, error_sentence(report),
-            " ".join(said) or "No parameter was identified.")  # fmt: skip
+            " ".join(texts) or "No parameter was identified.")  # fmt: skip
 
 
 def chances_sentence(report: Mapping[str, Any]) -> str:
@@ -476,9 +477,9 @@ def remains(loop: ClosedLoop) -> str:
 
 
 def disagreeing_sentence(loop: ClosedLoop) -> str:
-    said = [fault_sentence(s) for s in loop.suspects if s.role == "train"]
+    texts = [fault_sentence(s) for s in loop.suspects if s.role == "train"]
     added = f"with {' + '.join(loop.effects)} " if loop.effects else ""
-    return f"{' '.join(said)} Apart from that {added}{remains(loop)}."
+    return f"{' '.join(texts)} Apart from that {added}{remains(loop)}."
 
 
 def carried_sentence(loop: ClosedLoop) -> str:
@@ -486,7 +487,7 @@ def carried_sentence(loop: ClosedLoop) -> str:
     judged = loop.after if loop.withdrawn is None else loop.withdrawn.judged
     unseen = judged.holdout
     assert unseen is not None
-    factors = [float(np.sqrt(np.mean(raw**2))) / level.total for raw, level in zip(unseen.raw, unseen.data.levels,
+    factors = [rms(raw) / level.total for raw, level in zip(unseen.raw, unseen.data.levels,
                                                                                  strict=True)]  # fmt: skip
     worst = int(np.argmax(np.nan_to_num(factors, nan=np.inf)))
     missed = f"{unseen.data.each[worst].file} is missed by {factors[worst]:.3g} times its noise"
@@ -514,24 +515,24 @@ def doubtful(loop: ClosedLoop) -> str:
     """Say between what these records cannot decide."""
     if not loop.steps:
         return "No single answer is probable: these records tell too little."
-    said = [f"{s.effect} cannot be told from {' or '.join(s.alternatives)}" for s in loop.steps if s.alternatives]
-    said += [f"{s.effect} has a probability of {s.probability:.2f}" for s in loop.steps
+    texts = [f"{s.effect} cannot be told from {' or '.join(s.alternatives)}" for s in loop.steps if s.alternatives]
+    texts += [f"{s.effect} has a probability of {s.probability:.2f}" for s in loop.steps
              if not (s.claimed or s.alternatives)]  # fmt: skip
     rest = "a significant discrepancy remains, and" if loop.after.significant else "what remains is noise, but"
     judged = "" if loop.campaign.holdout else " No record was held out to judge it."
-    return f"With {' + '.join(loop.effects)} {rest} on these records {'; '.join(said)}.{judged}"
+    return f"With {' + '.join(loop.effects)} {rest} on these records {'; '.join(texts)}.{judged}"
 
 
 def missing_sentences(missing: Missing) -> list[str]:
     ports = ", ".join(f"{s.port} {max(s.share, 0.0):.0%}" for s in missing.signals[:MOST_PORTS])
-    said = [f"A signal without a form would remove this share of the residual at port: {ports}."]
+    texts = [f"A signal without a form would remove this share of the residual at port: {ports}."]
     best = {d.variable: d for d in sorted(missing.dependences, key=lambda d: d.share)}
     ranked = sorted((d for d in best.values() if d.share >= LEAST_SHARE), key=lambda d: -d.share)[:MOST_PORTS]
     curves = ", ".join(f"{d.variable}{TIMES_IN_WORDS[d.factor]} at {d.port} {d.share:.0%}" for d in ranked)
     if not curves:
-        return [*said, "What the residual follows was not found: no curve predicts parts left out of its fit."]
+        return [*texts, "What the residual follows was not found: no curve predicts parts left out of its fit."]
     shares = "What the residual follows, with the share that a curve over it predicts on parts left out"
-    return [*said, f"{shares}: {curves}."]
+    return [*texts, f"{shares}: {curves}."]
 
 
 def diagnosis_sentences(seen: Residuals) -> list[str]:
@@ -545,12 +546,12 @@ def diagnosis_sentences(seen: Residuals) -> list[str]:
         findings = [f for f in diagnosis.of_kind(kind) if f.p * len(diagnosis.findings) < SIGNIFICANCE]
         return sorted(findings, key=lambda f: -f.ratio)[:MOST_FINDINGS]
 
-    said = [f"What remains is more than noise (chance {'below ' if diagnosis.p < LEAST_CHANCE else ''}"
+    texts = [f"What remains is more than noise (chance {'below ' if diagnosis.p < LEAST_CHANCE else ''}"
             f"{max(diagnosis.p, LEAST_CHANCE):.2g})."]  # fmt: skip
     if not diagnosis.noise_known:
         levels = seen.data.levels
         of = f" of {sum(not level.known for level in levels)} of {len(levels)} signals" if levels[1:] else ""
-        said.append(f"No rest tells the noise{of}: the residual is tested against itself.")
+        texts.append(f"No rest tells the noise{of}: the residual is tested against itself.")
     wholes = {
         "size": "Its mean square is {ratio:.4g} times that of the noise.",
         "repeats": "Repeats of {where} agree with each other {ratio:.3g} times better than with the model (mean "
@@ -558,36 +559,36 @@ def diagnosis_sentences(seen: Residuals) -> list[str]:
         "autocorrelation": "It is correlated in time: the Ljung-Box statistic over {where} is {ratio:.3g} times what "
                            "noise gives.",
     }  # fmt: skip
-    said += [text.format(**vars(f)) for kind, text in wholes.items() for f in significant(kind)[:1]]
-    said += filter(None, (time_in_words(seen),))
+    texts += [text.format(**vars(f)) for kind, text in wholes.items() for f in significant(kind)[:1]]
+    texts += filter(None, (time_in_words(seen),))
     kinds = (("record", "record"), ("stage", "stage"), ("dependence", "variable"), ("frequency", "frequency"))
     for kind, name in kinds:
         places = ", ".join(f"{f.where} ({f.ratio:.3g} times the noise)" for f in significant(kind))
-        said += [f"Where it is, by {name}: {places}."] if places else []
-    return said
+        texts += [f"Where it is, by {name}: {places}."] if places else []
+    return texts
 
 
 def shift_sentences(before: Judgement, after: Judgement) -> list[str]:
-    later, said = {e.name: e for e in after.estimates}, []
+    later, texts = {e.name: e for e in after.estimates}, []
     for old in before.estimates:
         new = later[old.name]
         # Only trusted parameters show a bias: others may be as wrong as before.
         if new.trusted and old.low is not None and abs(old.value - new.value) > SHIFTED * abs(new.value):
             share = (old.value - new.value) / abs(new.value) if new.value else np.inf
-            said.append(f"{old.name} was biased by {share:+.2%}: {value_text(old.entry)} before, "
+            texts.append(f"{old.name} was biased by {share:+.2%}: {value_text(old.entry)} before, "
                         f"{value_text(new.entry)} after.")  # fmt: skip
-    return said
+    return texts
 
 
 def constant_sentences(fit: Fit) -> list[str]:
     """Say which constants are farther from their declared values than 95 % of sound ones."""
-    said = []
+    texts = []
     for name, off in fit.deviations.items():
         if abs(off) > NORMAL_95:
             share = f" ({fit.constants[name]:+.1%})" if name in fit.constants else ""
             side = "above" if off > 0.0 else "below"
-            said.append(f"{name} is {abs(off):.1f} standard deviations {side} its declared value{share}.")
-    return said
+            texts.append(f"{name} is {abs(off):.1f} standard deviations {side} its declared value{share}.")
+    return texts
 
 
 def doubt_sentences(judged: Judgement) -> list[str]:

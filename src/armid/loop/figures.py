@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from armid.estimation.corrections import rms
 from armid.inference.checks import Residuals
-from armid.inference.missing_signal import Dependence, Missing, hats
+from armid.inference.kinds.missing_signal import Dependence, Missing, hats
 from armid.loop.result import ClosedLoop, Judgement
 from armid.model import Array
 from armid.problem.problem import Replay
@@ -100,7 +101,7 @@ def residual_figure(loop: ClosedLoop) -> Any:
         factor, unit = shown(1.0, replay.record.unit)
         noise = loop.outputs.get(replay.record.output, {"noise_rms": loop.noise_rms})["noise_rms"]
         draw_residuals(axis, curves, noise, replay.record.unit)
-        errors = [f"{factor * float(np.sqrt(np.mean(x**2))):.3g}" for x in residuals]
+        errors = [f"{factor * rms(x):.3g}" for x in residuals]
         title = f"{replay.name} ({replay.record.role}), RMSE {' to '.join(errors)} {unit}"
         axis.set_title(title, fontsize="medium")
     figure.legend(*axes[0][0].get_legend_handles_labels(), loc="lower center", ncols=3, frameon=False)

@@ -19,8 +19,8 @@ from armid.inference.hypothesis import Hypotheses, Hypothesis, words
 from armid.inference.infer import Inference
 from armid.inference.kinds.drifts import LARGEST_DRIFT, OfParameter
 from armid.inference.kinds.faults import OfRecord
+from armid.inference.kinds.missing_signal import Missing
 from armid.inference.library import Library
-from armid.inference.missing_signal import Missing
 from armid.inference.model import Fit
 from armid.model import Array, Model
 from armid.problem.problem import Replay
@@ -399,8 +399,8 @@ FREED, LEFT_OUT = "freed", "left_out"
 def record_faults_of(accused: Sequence[Hypothesis], model: Hypotheses, inference: Inference) -> list[RecordFault]:
     """Return the faults of records, and the drifts, among some hypotheses of a model."""
     fit = inference.exploration.fits[model]
-    told: dict[str, Callable[..., RecordFault]] = {"record": fault_of, "drift": drift_of}
-    return [told[h.kind](h.means, h.name, fit, inference) for h in sorted(accused) if h.kind in told]
+    made_by_kind: dict[str, Callable[..., RecordFault]] = {"record": fault_of, "drift": drift_of}
+    return [made_by_kind[h.kind](h.means, h.name, fit, inference) for h in sorted(accused) if h.kind in made_by_kind]
 
 
 def fault_of(what: OfRecord, name: str, fit: Fit, inference: Inference) -> RecordFault:

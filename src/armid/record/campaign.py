@@ -371,20 +371,20 @@ def scaled(plant: Plant, records: Sequence[Record], where: str) -> Plant:
     return replace(plant, scales=replace(plant.scales, effort=effort, speed=speed))
 
 
-def tolerances_of(told: Mapping[str, float], plant: Plant, where: str, fixed: Iterable[str] = ()) -> dict[str, float]:
+def tolerances_of(given: Mapping[str, float], plant: Plant, where: str, fixed: Iterable[str] = ()) -> dict[str, float]:
     """Return the tolerance of each constant above 0: what the campaign tells, by name or as `default`, else the plant.
 
     What the plant declares as exact, or a record sets (start, target, load), keeps 0 unless it is named. fixed:
     parameters of the plant that the campaign fixes, which are constants then.
     """
     declared = {**dict.fromkeys(fixed), **{c.name: c.tolerance for c in plant.constants}}
-    for name in told:
+    for name in given:
         if name not in declared and name != DEFAULT_TOLERANCE:
             raise unknown_name("constant", name, [*declared, DEFAULT_TOLERANCE], f"{where}, tolerances")
     of_records, tolerances = set_by_records(plant), {}
     for name, usual in declared.items():
-        otherwise = 0.0 if usual == 0.0 or name in of_records else told.get(DEFAULT_TOLERANCE, usual or 0.0)
-        tolerances[name] = told.get(name, otherwise)
+        otherwise = 0.0 if usual == 0.0 or name in of_records else given.get(DEFAULT_TOLERANCE, usual or 0.0)
+        tolerances[name] = given.get(name, otherwise)
     return {name: tolerance for name, tolerance in tolerances.items() if tolerance > 0.0}
 
 

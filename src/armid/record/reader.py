@@ -193,8 +193,8 @@ def rest_and_noise(new: New, inputs: Sequence[Array], is_speed: bool) -> tuple[A
     return (rest - np.mean(rest), noise) if noise.source == "rest" else (new.rest, noise)
 
 
-def warn(table: CsvTable, said: str) -> None:
-    warnings.warn(f"{table.file}: {said}", RecordWarning, stacklevel=2)
+def warn(table: CsvTable, sentence: str) -> None:
+    warnings.warn(f"{table.file}: {sentence}", RecordWarning, stacklevel=2)
 
 
 def check_empty(table: CsvTable, header: str, present: Mask) -> None:

@@ -324,7 +324,7 @@ def stored_figures(
 
 def titled(sentences: Mapping[str, Sequence[str]]) -> tuple[Sentences, ...]:
     """Return sentences under their titles, "" for none; a title without sentences is left out."""
-    return tuple(Sentences(tuple(said), title) for title, said in sentences.items() if said)
+    return tuple(Sentences(tuple(texts), title) for title, texts in sentences.items() if texts)
 
 
 def correlation_tables(correlation: Mapping[str, Mapping[str, float | None]]) -> tuple[Table, ...]:

@@ -355,10 +355,10 @@ def reading(path: Path) -> Iterator[sqlite3.Connection]:
         except sqlite3.OperationalError as error:
             if not error.sqlite_errorname.startswith(("SQLITE_CANTOPEN", "SQLITE_READONLY")):
                 raise
-            beside = stack.enter_context(TemporaryDirectory(prefix="armid-"))
+            copies = stack.enter_context(TemporaryDirectory(prefix="armid-"))
             for file in path.parent.glob(f"{path.name}*"):
-                shutil.copy(file, beside)
-            connection = stack.enter_context(closing(connected(Path(beside) / path.name)))
+                shutil.copy(file, copies)
+            connection = stack.enter_context(closing(connected(Path(copies) / path.name)))
             check_format(connection, path)
         try:
             yield connection

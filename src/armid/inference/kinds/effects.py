@@ -86,7 +86,7 @@ def proposals(
 
 
 def proposal(fit: Fit, hypothesis: Hypothesis, key: EffectKey, library: Library) -> Proposal | None:
-    records = beside(fit, (*fit.active, key), library)
+    records = records_with(fit, (*fit.active, key), library)
     grid = activation_grid(records, key, library.declared_ranges(records.model, key), SHARES_TRIED)
     moved = responses(fit, records, grid)
     good = np.flatnonzero(np.isfinite(moved).all(axis=1) & (np.abs(moved).max(axis=1, initial=0.0) > 0.0))
@@ -99,7 +99,7 @@ def proposal(fit: Fit, hypothesis: Hypothesis, key: EffectKey, library: Library)
     )
 
 
-def beside(fit: Fit, active: tuple[EffectKey, ...], library: Library) -> WhiteRecords:
+def records_with(fit: Fit, active: tuple[EffectKey, ...], library: Library) -> WhiteRecords:
     """Return the problem with other effects on the records as a fit has them: its constants, faults and cover."""
     problem = problem_about(fit, active, library)
     if fit.records.data.cover is not None:
@@ -117,7 +117,7 @@ def refit(
     begun: where its first steps led; the fit goes on from there.
     """
     active = (*fit.active, key)
-    problem = beside(fit, active, library)
+    problem = records_with(fit, active, library)
     if begun is None:
         starts = np.array(starts_of(fit, ahead, problem, library))
         order = np.argsort(projected(fit, problem, about.scale.weight).chi2(starts), kind="stable")
@@ -160,7 +160,7 @@ def base_of(fit: Fit, active: tuple[EffectKey, ...], library: Library) -> WhiteR
 def first_steps(fit: Fit, about: Expansion, ahead: Forecast, library: Library) -> tuple[float, Array]:
     """Return where the first steps of a fit from the best start lead: the sum of squares, and the candidate."""
     key = ahead.proposal.hypothesis.means
-    problem = beside(fit, (*fit.active, key), library)
+    problem = records_with(fit, (*fit.active, key), library)
     starts, projection = np.array(starts_of(fit, ahead, problem, library)), projected(fit, problem, about.scale.weight)
     chi2 = projection.chi2(starts)
     best = starts[int(np.argmin(chi2))]

@@ -18,7 +18,7 @@ import numpy as np
 from armid.engine import along
 from armid.engine.simulate import flat
 from armid.inference.candidates import Double, EffectKey
-from armid.inference.kinds.effects import beside
+from armid.inference.kinds.effects import records_with
 from armid.inference.library import Library
 from armid.inference.model import Fit, candidate_at
 from armid.inference.whitening import WhiteRecords
@@ -95,7 +95,7 @@ def doubles(fit: Fit, library: Library) -> dict[EffectKey, Double]:
     known: dict[int, tuple[States, dict[str, Array]]] = {}
     found: dict[EffectKey, Double] = {}
     for key in library.joinable(()):
-        records = beside(fit, (key,), library)
+        records = records_with(fit, (key,), library)
         if id(records.model) not in known:
             states = scattered(records, candidate_at(records, fit.values))
             known[id(records.model)] = states, states.changes(own)

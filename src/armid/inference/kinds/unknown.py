@@ -13,8 +13,8 @@ from scipy.linalg import block_diag
 from armid.inference.decisions import calibration
 from armid.inference.evidence import Expansion, Forecast
 from armid.inference.hypothesis import Hypothesis, Proposal
+from armid.inference.kinds.missing_signal import Segment, segments_about
 from armid.inference.library import Library
-from armid.inference.missing_signal import Segment, segments_about
 from armid.inference.model import Fit, fit_from, unless_diverged
 from armid.inference.unknowns import Freed, freed
 from armid.inference.whitening import Cover, WhiteRecords

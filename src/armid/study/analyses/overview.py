@@ -256,22 +256,22 @@ def by_fitness(evidence: Evidence, _: DataFrame) -> tuple[str, ...]:
     runs = evidence.runs[several == several.max()]
     if several.max() < 2:
         return ()
-    said = []
+    texts = []
     for setting in noisy_first(evidence)[:MOST_SETTINGS]:
         medians = runs[runs["setting"] == setting].groupby("fitness", sort=False)["largest_error"].median()
         ordered = medians.sort_values(kind="stable")
-        said.append(f"{setting}: {', '.join(f'{name} {percent(value)}' for name, value in ordered.items())}")
-    return (f"Largest error of a run by fitness, median, the nearest to the truth first. {'; '.join(said)}.",)
+        texts.append(f"{setting}: {', '.join(f'{name} {percent(value)}' for name, value in ordered.items())}")
+    return (f"Largest error of a run by fitness, median, the nearest to the truth first. {'; '.join(texts)}.",)
 
 
 def best(evidence: Evidence, frame: DataFrame) -> tuple[str, ...]:
     """Return the best identifier of each setting, those that do not differ from it, and how many arrived."""
     known = frame[frame["variant"] != PAPER].dropna(subset="largest_median")
     settings = [s for s in noisy_first(evidence) if (known["setting"] == s).any()]
-    said = [best_at(evidence, known[known["setting"] == setting], setting) for setting in settings[:MOST_SETTINGS]]
+    texts = [best_at(evidence, known[known["setting"] == setting], setting) for setting in settings[:MOST_SETTINGS]]
     more = len(settings) - MOST_SETTINGS
     rest = f"; {more} more setting{'s' if more > 1 else ''} below" if more > 0 else ""
-    return (f"Best: {'; '.join(said)}{rest}.",) if said else ()
+    return (f"Best: {'; '.join(texts)}{rest}.",) if texts else ()
 
 
 def best_at(evidence: Evidence, own: DataFrame, setting: str) -> str:
@@ -292,16 +292,16 @@ def best_at(evidence: Evidence, own: DataFrame, setting: str) -> str:
 
 def own(evidence: Evidence, frame: DataFrame) -> tuple[str, ...]:
     """Return where the identifiers of plug-ins stand: by mean rank over the cases, on one case by their error."""
-    said = []
+    texts = []
     for setting in noisy_first(evidence)[:MOST_SETTINGS]:
         rows = frame[(frame["setting"] == setting) & (frame["variant"] != PAPER)]
         medians, (tests, _) = rows.set_index("variant")["largest_median"], evidence.once(compared, setting)
         order = tests.ranks if len(rows) > 1 and tests.n_cases > 1 else medians
         mine = [v for v in order.sort_values(kind="stable").index if v in evidence.own and np.isfinite(medians[v])]
-        said += [f"{v} is number {1 + int((order < order[v]).sum())} of {len(order)} ({setting}, "
+        texts += [f"{v} is number {1 + int((order < order[v]).sum())} of {len(order)} ({setting}, "
                  f"{percent(medians[v])})" for v in mine[:MOST_OWN]]  # fmt: skip
-        said += [f"{len(mine) - MOST_OWN} more in the table ({setting})"] if len(mine) > MOST_OWN else []
-    return (f"Your own: {'; '.join(said)}.",) if said else ()
+        texts += [f"{len(mine) - MOST_OWN} more in the table ({setting})"] if len(mine) > MOST_OWN else []
+    return (f"Your own: {'; '.join(texts)}.",) if texts else ()
 
 
 def undetermined(evidence: Evidence) -> tuple[str, ...]:
@@ -323,9 +323,9 @@ def lowest_fitness(evidence: Evidence) -> str:
         return "No run has a result."
     medians = done.groupby(["fitness", "variant"], sort=False)["value"].median()
     scales = {f: evidence.scale_of_fitness(str(f)) for f in dict.fromkeys(done["fitness"])}
-    said = [f"{medians.loc[f].idxmin()}, {factor * medians.loc[f].min():.6g} of {f}{unit}"
+    texts = [f"{medians.loc[f].idxmin()}, {factor * medians.loc[f].min():.6g} of {f}{unit}"
             for f, (unit, factor) in scales.items()]  # fmt: skip
-    return f"No truth is known. Lowest median fitness: {'; '.join(said)}."
+    return f"No truth is known. Lowest median fitness: {'; '.join(texts)}."
 
 
 def percent(value: float) -> str:
