@@ -215,6 +215,9 @@ def test_a_machine_that_swings_freely_is_not_at_rest(rng):
     tail = rest_between(np.exp(-time / 0.1) * np.sin(2 * np.pi * time / 0.5) + noise, still, is_speed=False)
     assert tail.size in (400, 800)
     assert np.std(tail) == pytest.approx(0.001, rel=0.1)
+    # one that still runs down, seen by a coarse encoder, is not
+    down = np.round(-2.0 * np.exp(-np.arange(137) / 40.0) + rng.normal(0, 0.25, (100, 137)))
+    assert max(rest_between(one, still[:137], is_speed=False).size for one in down) < 137
     # noise of a filtered sensor is a rest, in nearly all of 200
     coloured = lfilter([1.0], [1.0, -0.8], rng.normal(0, 1, (200, 1000)))
     kept = [rest_between(one, still[:1000], is_speed=False).size == 1000 for one in coloured]

@@ -11,6 +11,7 @@ from scipy.special import chdtrc, fdtrc
 
 from armid.engine import along
 from armid.estimation.constants import columns_of, moved_record, slopes_of_constants
+from armid.estimation.corrections import rms
 from armid.estimation.identify import JointErrors, campaign_errors
 from armid.estimation.information import start_changes
 from armid.estimation.input_noise import estimated, pooled_noise
@@ -36,6 +37,8 @@ CERTAIN = 1e-7
 DEPENDENT = 1e-11
 # Share of the samples of a record over which lines are drawn where they are no data.
 MOST_BRIDGED = 0.05
+# Draws of the noise of sensors that round.
+N_ROUNDED = 8
 # Below this share of the largest speed a machine is at rest; below this share of the largest change its speed is even.
 STILL, EVEN_SPEED = 0.02, 0.1
 
@@ -109,9 +112,33 @@ class Residuals:
     @cached_property
     def renewed(self) -> list[Array]:
         """What each sample of the residual adds to its neighbour, by record: e_t - rho e_(t-1)."""
+        return self.without_memory(self.residual)
+
+    def without_memory(self, white: Array) -> list[Array]:
         pairs = [(x, self.memory.get(r.place, 0.0)) for x, r in
-                 zip(self.data.by_record(self.residual), self.replays, strict=True)]  # fmt: skip
+                 zip(self.data.by_record(white), self.replays, strict=True)]  # fmt: skip
         return [x if rho == 0.0 else np.append(x[:1], x[1:] - rho * x[:-1]) for x, rho in pairs]
+
+    @cached_property
+    def rounded(self) -> list[list[Array]]:
+        """What sensors that round leave of the simulated motion, as `renewed`, in each of some draws of their noise.
+
+        A slow motion passes their steps in a saw tooth, and where it stands their error stays: such noise has a colour
+        that changes with the motion. Empty where no sensor rounds, or where the noise is more than that of white ones.
+        """
+        levels, sensors = self.data.levels, [r.record.signals[0].sensor for r in self.replays]
+        is_white = all(level.is_white and not level.growth for level in levels) and not self.data.inputs_count
+        if not is_white or not any(s.step for s in sensors):
+            return []
+        rng, signals = np.random.default_rng(0), [r.signal(self.candidate[np.newaxis])[0] for r in self.replays]
+        sizes = [level.rms if self.data.known else rms(raw) for level, raw in zip(levels, self.raw, strict=True)]
+        fine = [np.sqrt(max(size**2 - s.rounding**2, 0.0)) for size, s in zip(sizes, sensors, strict=True)]
+        draws = []
+        for _ in range(N_ROUNDED):
+            errors = [sensor.reading(y + size * rng.standard_normal(len(y)), float(r.measured[0])) - y
+                      for sensor, y, size, r in zip(sensors, signals, fine, self.replays, strict=True)]  # fmt: skip
+            draws.append(self.without_memory(self.data.white(errors)))
+        return draws
 
     @cached_property
     def raw(self) -> list[Array]:
@@ -340,13 +367,20 @@ def time_tests(seen: Residuals) -> Iterator[Finding]:
     if hum:
         parts = [without_lines(p, hum, r.spacing) for p, r in zip(parts, seen.data.each, strict=True)]
     lags = min(LAGS, *(len(p) // 4 for p in parts))
+    free = lags * len(parts)
+    expected = max(float(np.mean([memory_square(draw, lags) for draw in seen.rounded] or [free])), free)
+    ratio = memory_square(parts, lags) / expected
+    yield Finding("autocorrelation", f"{lags} lags", ratio, float(chdtrc(free, ratio * free)))
+
+
+def memory_square(parts: Sequence[Array], lags: int) -> float:
+    """Return the sum of the squared autocorrelations up to a lag, of white noise a chi-square of their number."""
     total = 0.0
     for deviations in (p - np.mean(p) for p in parts):
         n = len(deviations)
         covariance = np.array([deviations[lag:] @ deviations[: n - lag] for lag in range(lags + 1)])
         total += n * (n + 2.0) * float(np.sum((covariance[1:] / covariance[0]) ** 2 / (n - np.arange(1.0, lags + 1.0))))
-    ratio = total / (lags * len(parts))
-    yield Finding("autocorrelation", f"{lags} lags", ratio, float(chdtrc(lags * len(parts), total)))
+    return total
 
 
 def dependence_tests(seen: Residuals) -> Iterator[Finding]:
@@ -403,28 +437,35 @@ def band_tests(seen: Residuals) -> Iterator[Finding]:
     """Compare the power of the residual in bands of frequency with that of the rest, or with a flat one.
 
     White noise has a flat spectrum, whose level the rest tells, or without one the residual; of coloured noise the
-    rest itself shows the spectrum.
+    rest itself shows the spectrum. What a sensor rounds away of the motion has the spectrum of `Residuals.rounded`.
     Where the rest hums, frequencies near by are left out: a line does not scatter as noise does.
     """
     coloured = not (seen.doubted or seen.data.blocks) and seen.data.rests_have_colour
     hum = mains_hum(seen)
-    white = [level.rms * r for level, r in zip(seen.data.levels, seen.renewed, strict=True)]
-    raw = [bridged(x, r) for x, r in zip(seen.raw, seen.replays, strict=True)] if coloured else white
-    left = spectra(raw, seen, hum)
+    whole = [bridged(x, r) for x, r in zip(seen.raw, seen.replays, strict=True)] if coloured else []
+    left = spectra(whole or scaled(seen, seen.renewed), seen, hum)
     # an output with gaps may have no rest where another has one
     still = [r.rest - np.mean(r.rest) if r.rest.size else r.rest for r in seen.data.each]
     rests = spectra(still, seen, hum) if coloured else {}
     flat = 1.0 if seen.data.sized else float(np.mean(np.concatenate(seen.renewed) ** 2))
+    drawn = [] if coloured else [spectra(scaled(seen, draw), seen, hum) for draw in seen.rounded]
+    if drawn and not seen.data.sized:
+        flat /= float(np.mean(np.concatenate(list(chain.from_iterable(seen.rounded))) ** 2))
     for band, values in sorted(left.items()):
         other = rests.get(band, [])
         if coloured and len(other) < FEWEST_ORDINATES:
             continue
-        against = float(np.mean(other)) if coloured else flat
+        shape = float(np.mean([np.mean(one[band]) for one in drawn])) if drawn else 1.0
+        against = float(np.mean(other)) if coloured else flat * shape
         ratio, free = float(np.mean(values)) / against, 2.0 * INDEPENDENT * len(values)
         known = 2.0 * INDEPENDENT * len(other) if coloured else seen.data.n_noise(otherwise=np.inf)
         high = BANDS_HZ[band + 1]
         where = f"{BANDS_HZ[band]:g} to {high:g} Hz" if np.isfinite(high) else f"above {BANDS_HZ[band]:g} Hz"
         yield Finding("frequency", where, ratio, chance(ratio, free, known))
+
+
+def scaled(seen: Residuals, white: Sequence[Array]) -> list[Array]:
+    return [level.rms * x for level, x in zip(seen.data.levels, white, strict=True)]
 
 
 def bridged(signal: Array, replay: Replay) -> Array:

@@ -67,6 +67,10 @@ class Sensor:
         """Rms of what it rounds away [unit of the output]."""
         return self.step / math.sqrt(12.0)
 
+    def reading(self, values: Array, known: float) -> Array:
+        """Return values as the sensor rounds them; known: one of its readings [unit of the output]."""
+        return known + np.round((values - known) / self.step) * self.step if self.step else values
+
 
 def sensor_of(values: Array) -> Sensor:
     """Return the sensor of the values of one output as they were read, (n_rows,)."""
@@ -178,9 +182,10 @@ def noise_of(rest: Array, motion: Array, interval: float, times: Array | None = 
     if is_equal or np.std(rest) < HIDDEN_NOISE * step:
         apart, agrees = noise_in_motion(motion, times)
         # Of a slow motion the steps alone look like up to twice their noise; what a step hides is less than a step.
-        is_shown = apart > 2.0 * floor if is_equal else floor < apart <= step
-        if is_short or (agrees and is_shown):
+        if is_short or (is_equal and agrees and apart > 2.0 * floor):
             return Noise(max(apart, floor), None, 0.0, 1.0, motion.size, "differences")
+        if not is_equal:
+            return Noise(float(np.clip(apart, floor, max(step, floor))), None, 0.0, 1.0, motion.size, "differences")
     mean = float(np.mean(rest))
     # of equal values the mean can miss the value by its last digit, which would look like correlated noise
     deviations = rest - mean if np.ptp(rest) > 0 else np.zeros_like(rest)
@@ -288,9 +293,14 @@ def stands_still(rest: Array, size: float, is_speed: bool) -> bool:
     """
     if is_speed and abs(float(np.mean(rest))) > AT_REST * size:
         return False
-    correlation = autocorrelation(rest - np.mean(rest))
+    # a drift would look like noise of a long memory
+    times = np.arange(rest.size) - 0.5 * (rest.size - 1)
+    deviations = rest - np.mean(rest)
+    deviations -= times * float(times @ deviations) / float(times @ times)
+    correlation = autocorrelation(deviations)
     independent = rest.size / (1.0 + 2.0 * float(np.sum(correlation**2)))
-    error = 2.0 * float(np.std(rest)) * np.sqrt((1.0 + 2.0 * sum_above_chance(correlation, rest.size)) / rest.size)
+    forgets = 1.0 + 2.0 * sum_above_chance(correlation, rest.size)
+    error = 2.0 * float(np.std(deviations)) * np.sqrt(forgets / rest.size)
     first, second = rest[: rest.size // 2], rest[rest.size // 2 :]
     drifts = abs(float(np.mean(first) - np.mean(second))) > STANDS * error
     sizes = np.maximum([np.std(first), np.std(second)], np.finfo(np.float64).tiny)
