@@ -12,6 +12,8 @@ from synthetic import moved, write_records
 
 pytestmark = pytest.mark.slow
 MASS, DAMPING, STEP_MM, OWN_MM, LATE_S = 4.1, 47.0, 0.02, 0.008, 0.013
+# Between the wave numbers from which a fit begins where nothing else is known.
+WAVES = 320.0
 INERTIA, TORQUE_CONSTANT, FRICTION, MOMENT, RESISTANCE, DEAD_V = 0.02, 0.25, 0.01, 0.15, 1.2, 0.8
 
 
@@ -51,18 +53,37 @@ DISC = Plant(
 )  # fmt: skip
 
 
+def pushed(rng, times, slow=1.0):
+    """Force [N] at some times, at rest for half a second."""
+    waves = zip(rng.uniform(4.0, 10.0, 3), rng.uniform(0.4, 3.0, 3), rng.uniform(0.0, 6.0, 3), strict=True)
+    ramp = np.clip((times - 0.5) / 0.5, 0.0, 1.0)
+    return np.round(ramp * sum(a * np.sin(2.0 * np.pi * f / slow * times + p) for a, f, p in waves), 7)
+
+
 def carriage_records(rng, late):
-    """Tables of four records, at rest for half a second; the encoder of one answers late."""
+    """Tables of four records; the encoder of one answers late."""
     times = 0.002 * np.arange(2001)
     for i in range(4):
-        waves = zip(rng.uniform(4.0, 10.0, 3), rng.uniform(0.4, 3.0, 3), rng.uniform(0.0, 6.0, 3), strict=True)
-        ramp = np.clip((times - 0.5) / 0.5, 0.0, 1.0)
-        force = np.round(ramp * sum(a * np.sin(2.0 * np.pi * f * times + p) for a, f, p in waves), 7)
+        force = pushed(rng, times)
         dense = np.interp(0.001 * np.arange(4001), times, force)
         position = 1e3 * lsim(([1.0 / MASS], [1.0, DAMPING / MASS, 0.0]), dense, 0.001 * np.arange(4001))[1]
         shown = np.interp(times - (late if i == 1 else 0.0), 0.001 * np.arange(4001), position)
         shown = np.round(STEP_MM * np.round((shown + rng.normal(0.0, OWN_MM, len(times))) / STEP_MM), 2)
         yield {"time_s": times, "force_N": force, "position_mm": shown}
+
+
+def toothed_records(rng, step_mm, own_mm, teeth=0.0, slow=1.0):
+    """Tables of four records; teeth: force [N] that repeats WAVES times in 2 pi m."""
+
+    def rates(x, force):
+        return np.array([x[1], (force - DAMPING * x[1] - teeth * np.sin(WAVES * x[0])) / MASS])
+
+    times = 0.002 * np.arange(2001)
+    for _ in range(4):
+        force = pushed(rng, times, slow)
+        position = 1e3 * moved(rates, force, 0.002, (0.0, 0.0), "linear", 1)[:, 0]
+        shown = step_mm * np.round((position + rng.normal(0.0, own_mm, len(times))) / step_mm)
+        yield {"time_s": times, "force_N": force, "position_mm": np.round(shown, 3)}
 
 
 def campaign(folder, plant, records):
@@ -88,6 +109,21 @@ def test_an_encoder_that_is_fine_for_its_travel_and_coarse_for_its_noise(tmp_pat
         assert estimate.low <= value <= estimate.high
         assert estimate.high - estimate.low < 0.01 * value
     assert report_of(found)["noise_rms"] == pytest.approx(truth, rel=0.06)
+
+
+def test_what_an_encoder_rounds_away_of_a_slow_motion_is_no_discrepancy(tmp_path):
+    """It passes its steps in a saw tooth, and at rest it shows less noise than in motion."""
+    records = campaign(tmp_path, CARRIAGE, toothed_records(np.random.default_rng(26), 1.0, 0.22, slow=2.0))
+    found = close_loop(records.model(), records, {n: EFFECTS[n] for n in ("coulomb", "quadratic_drag", "drive_lag")})
+    assert found.verdict == "no_discrepancy"
+    assert found.inference.probabilities["unknown"] < 0.05
+
+
+def test_teeth_are_found_by_their_number_wherever_it_lies(tmp_path):
+    records = campaign(tmp_path, CARRIAGE, toothed_records(np.random.default_rng(25), 0.02, 0.008, teeth=1.5))
+    found = close_loop(records.model(), records, {n: EFFECTS[n] for n in ("coulomb", "torque_ripple", "drive_lag")})
+    assert (found.verdict, found.effects) == ("explained", ("torque_ripple",))
+    assert found.parameters["torque_ripple.waves"] == pytest.approx(WAVES, rel=1e-3)
 
 
 def turning(x, fed):

@@ -468,19 +468,22 @@ class Activation:
 
 
 def activation_grid(
-    records: WhiteRecords, key: EffectKey, ranges: Mapping[str, tuple[float, float]], shares: Sequence[float]
-) -> list[Activation]:
+    records: WhiteRecords, key: EffectKey, ranges: Mapping[str, tuple[float, float]], shares: Sequence[float],
+    places: Mapping[str, Array],
+) -> list[Activation]:  # fmt: skip
     """Return the grid over strengths and shapes of one effect.
 
     Strengths are the free parameters with a null value: each alone, and all together where there are several.
     ranges: of parameters whose box is wider than what is tried. shares: of the range, over which a strength is tried.
+    places: of shapes that are tried at these values.
     """
     space, declared = records.space, records.model.parameters
     mine = [n for n in space.free_names if key.owns(n)]
     null = {n: float(v) for n in mine if (v := declared[n].null) is not None}
     bound = {n: (space.low[space.index(n)], space.high[space.index(n)]) for n in mine} | dict(ranges)
     shapes = [n for n in mine if n not in null]
-    along = [points_within(*bound[n], count) for n, count in zip(shapes, shape_counts(len(shapes)), strict=True)]
+    along = [places[n] if n in places else points_within(*bound[n], count)
+             for n, count in zip(shapes, shape_counts(len(shapes)), strict=True)]  # fmt: skip
     points = [dict(zip(shapes, map(float, p), strict=True)) for p in product(*along)]
     chosen = [(n,) for n in null] + ([tuple(null)] if len(null) > 1 else [])
     activations = []

@@ -1,5 +1,6 @@
 """Effects of the library that may be missing: each form on a grid of its shapes, its strength from weak to strong."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
@@ -7,6 +8,7 @@ import numpy as np
 
 from armid.estimation.least_squares import descend
 from armid.inference.candidates import EffectKey
+from armid.inference.checks import square_along, train_residuals
 from armid.inference.decisions import OUT_OF_TOLERANCE, calibration
 from armid.inference.evidence import SCALES_OF_STRENGTH, Expansion, Forecast
 from armid.inference.hypothesis import Hypothesis, Proposal
@@ -14,6 +16,7 @@ from armid.inference.library import Library, activation_grid
 from armid.inference.model import (
     ROUGHLY,
     Fit,
+    beyond,
     fit_from,
     free_values,
     problem_about,
@@ -32,6 +35,8 @@ SHARES_TRIED = (SLOPE, 0.05, 0.4)
 N_STARTS_OF_EFFECT = 4
 # First steps of a fit, after which it shows how far it may lead.
 N_FIRST_STEPS = 2
+# Units of a wave number; how many of them are looked at, simulated at once, and tried.
+OF_WAVES, MOST_WAVES, WAVES_AT_ONCE, N_WAVES = ("1/rad", "1/m"), 256, 64, 8
 
 
 def hypotheses(library: Library) -> dict[EffectKey, Hypothesis]:
@@ -87,16 +92,54 @@ def proposals(
 
 def proposal(fit: Fit, hypothesis: Hypothesis, key: EffectKey, library: Library) -> Proposal | None:
     records = records_with(fit, (*fit.active, key), library)
-    grid = activation_grid(records, key, library.declared_ranges(records.model, key), SHARES_TRIED)
+    ranges = library.declared_ranges(records.model, key)
+    places, among = waves_tried(fit, records, key, ranges)
+    grid = activation_grid(records, key, ranges, SHARES_TRIED, places)
     moved = responses(fit, records, grid)
     good = np.flatnonzero(np.isfinite(moved).all(axis=1) & (np.abs(moved).max(axis=1, initial=0.0) > 0.0))
     if not len(good):
         return None
     chosen = [grid[i] for i in good]
-    variants = np.full(len(good), -np.log(len(grid)))
+    variants = np.full(len(good), -np.log(len(grid) * among))
     return Proposal(
         hypothesis, moved[good], SCALES_OF_STRENGTH, variants, partial(refit, key, library), one_sided=True, grid=chosen
     )
+
+
+def waves_tried(
+    fit: Fit, records: WhiteRecords, key: EffectKey, ranges: Mapping[str, tuple[float, float]]
+) -> tuple[dict[str, Array], float]:
+    """Return at which wave numbers an effect that repeats with position is tried, and the share that these are.
+
+    Records of a travel L tell wave numbers apart that differ by pi/L. All of them are looked at to first order; those
+    that would leave least are tried. share: how many were looked at for each that is tried; nothing and 1 of an effect
+    without a wave number.
+    """
+    space, plant = records.space, records.model.plant
+    mine = [n for n in space.free_names if key.owns(n) and records.model.parameters[n].null is None]
+    travel = train_residuals(fit).variables.get(plant.aliases.get("theta", "theta"))
+    waves = [n for n in mine if records.model.parameters[n].unit in OF_WAVES]
+    if travel is None or len(mine) != 1 or not waves:
+        return {}, 1.0
+    low, high = (float(end[space.index(waves[0])]) for end in (space.low, space.high))
+    longest = max(float(np.ptp(part)) for part in fit.records.data.by_record(travel))
+    n = int(np.clip((high - low) * longest / np.pi, N_WAVES, MOST_WAVES))
+    numbers = np.linspace(low, high, n)
+    grid = activation_grid(records, key, ranges, (SLOPE,), {waves[0]: numbers})
+    alone = [a for a in grid if sum(v != a.null[p] for p, v in a.full.items() if p in a.null) == 1]
+    alone = [a for a in alone if all(v >= a.null[p] for p, v in a.full.items() if p in a.null)]
+    alone.sort(key=lambda a: a.full[waves[0]])
+    each = len(alone) // n
+    squares = []
+    for first in range(0, len(alone), WAVES_AT_ONCE * each):
+        moved = np.nan_to_num(responses(fit, records, alone[first : first + WAVES_AT_ONCE * each]))
+        squares += [square_along(beyond(fit.basis, columns.T), fit.residual)[0]
+                    for columns in moved.reshape(-1, each, moved.shape[1])]  # fmt: skip
+    # neighbours of a peak lead to it
+    around = np.concatenate([[-np.inf], squares, [-np.inf]])
+    peaks = np.flatnonzero((around[1:-1] >= around[:-2]) & (around[1:-1] >= around[2:]))
+    tried = peaks[np.argsort(-np.asarray(squares)[peaks])[:N_WAVES]]
+    return {waves[0]: numbers[np.sort(tried)]}, n / len(tried)
 
 
 def records_with(fit: Fit, active: tuple[EffectKey, ...], library: Library) -> WhiteRecords:
