@@ -233,8 +233,10 @@ def swaps(
         ranking = [likeness(about, p) for p in [*proposals, *wide] if p.hypothesis.name not in others]
         ranking.sort(key=lambda pair: pair[0])
         ranking = list({one[1].hypothesis: one for one in ranking}.values())[::-1]
-        forms = [one for one in ranking if one[1].hypothesis.name == hypothesis.name]
-        for _, proposal, variant, strength in [*forms, *ranking[:N_SWAPPED]]:
+        # all forms of a name as soon as it is worth a fit, as for additions
+        likest = dict.fromkeys(one[1].hypothesis.name for one in ranking if one[1].hypothesis.name != hypothesis.name)
+        names = {hypothesis.name, *list(likest)[:N_SWAPPED]}
+        for _, proposal, variant, strength in (one for one in ranking if one[1].hypothesis.name in names):
             other = model - {hypothesis} | {proposal.hypothesis}
             if not is_complete(exploration, other):  # a known rival may have been fitted from afar
                 start = partial(swapped, fit, key, proposal, variant, strength)
