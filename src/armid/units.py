@@ -30,10 +30,13 @@ ENDS = {
     "deg_s": ("rad/s", DEGREE, ("deg/s", "\u00b0/s")), "rad_s": ("rad/s", 1.0, ("rad/s", "rad s-1")),
     "rpm": ("rad/s", TURN / 60.0, ("rpm", "1/min", "min-1")), "turns_s": ("rad/s", TURN, ("turns/s", "rev/s")),
     "counts_s": ("rad/s", np.nan, ("counts/s",)),
-    "m": ("m", 1.0, ("m",)), "mm": ("m", 1e-3, ("mm",)), "m_s": ("m/s", 1.0, ("m/s",)),
-    "mm_s": ("m/s", 1e-3, ("mm/s",)), "m_min": ("m/s", 1.0 / 60.0, ("m/min",)),
-    "A": ("A", 1.0, ("A",)), "N": ("N", 1.0, ("N",)),
-    "N_m": ("N m", 1.0, ("N m", "Nm", "N*m")), "V": ("V", 1.0, ("V",)),
+    "m": ("m", 1.0, ("m",)), "mm": ("m", 1e-3, ("mm",)), "cm": ("m", 1e-2, ("cm",)),
+    "m_s": ("m/s", 1.0, ("m/s",)), "mm_s": ("m/s", 1e-3, ("mm/s",)), "m_min": ("m/s", 1.0 / 60.0, ("m/min",)),
+    "cm_s": ("m/s", 1e-2, ("cm/s",)), "km_h": ("m/s", 1.0 / 3.6, ("km/h",)),
+    "A": ("A", 1.0, ("A",)), "mA": ("A", 1e-3, ("mA",)), "N": ("N", 1.0, ("N",)), "kN": ("N", 1e3, ("kN",)),
+    "N_m": ("N m", 1.0, ("N m", "Nm", "N*m")), "mN_m": ("N m", 1e-3, ("mN m", "mNm")),
+    "kN_m": ("N m", 1e3, ("kN m", "kNm")), "V": ("V", 1.0, ("V",)), "mV": ("V", 1e-3, ("mV",)),
+    "kV": ("V", 1e3, ("kV",)),
 }  # fmt: skip
 # SI unit of an output -> {end of the header of a column: factor that turns the column into SI, NaN for counts}.
 SUFFIXES = {unit: {end: factor for end, (own, factor, _) in ENDS.items() if own == unit}

@@ -1,5 +1,6 @@
 """Several outputs of a plant: declared, simulated at once, and read from the columns of a record."""
 
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -96,6 +97,20 @@ def test_a_record_brings_any_outputs_in_the_unit_of_its_header(tmp_path):
     assert (speed.unit, angle.unit, campaign.unit) == ("rad/s", "rad", "rad/s")
     assert speed.noise.rms == pytest.approx(NOISE_SPEED, rel=0.15)
     assert angle.noise.rms == pytest.approx(NOISE_ANGLE, rel=0.15)
+
+
+@pytest.mark.parametrize(("header", "warned"), [("load_speed_turns_s", False), ("load_speed_mm_s", True)])
+def test_a_column_that_has_the_name_of_an_output_and_no_unit_of_it_is_told(tmp_path, header, warned):
+    folder = write_drive(tmp_path / "drive")
+    for file in folder.glob("*.csv"):
+        first, *rows = file.read_text().splitlines()
+        file.write_text("\n".join([f"{first},{header}", *(f"{row},{i % 7}" for i, row in enumerate(rows))]))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        campaign = read_campaign(folder, {"two_inertias": two_inertias})
+    assert ("load_speed" in [o.name for o in campaign.plant.outputs]) != warned
+    said = [str(w.message) for w in caught if "is not read as output 'load_speed', load_speed_deg_s" in str(w.message)]
+    assert bool(said) == warned
 
 
 def test_every_state_of_the_start_comes_from_the_outputs_unless_it_is_given(tmp_path):

@@ -220,7 +220,8 @@ HEADERS = {
 COMMAND, CURRENT = "command", "current_A"
 # Units of a drive with a prefix -> end of the unit, and what turns a number into it.
 DRIVEN_IN = {"mV": ("V", 1e-3), "kV": ("V", 1e3), "mA": ("A", 1e-3), "kN": ("N", 1e3), "mN m": ("N_m", 1e-3),
-             "mNm": ("N_m", 1e-3), "kNm": ("N_m", 1e3), "kN m": ("N_m", 1e3)}  # fmt: skip
+             "mNm": ("N_m", 1e-3), "kNm": ("N_m", 1e3), "kN m": ("N_m", 1e3), "mN_m": ("N_m", 1e-3),
+             "kN_m": ("N_m", 1e3)}  # fmt: skip
 LINEAR, DRIVES = {*SUFFIXES["m"], *SUFFIXES["m/s"], "N"}, {"V", "A", "N", "N_m"}
 COUNT_ENDS = ("counts", "counts_s")
 TURNING_ENDS = {*SUFFIXES["rad/s"], *SUFFIXES["rad"]}
@@ -261,7 +262,9 @@ def column_of(header: str) -> FileColumn:
         return FileColumn(header, words, end, "" if end else unit, factor)
     ends = {*UNIT_ENDS.values(), *SECONDS}
     end = max((e for e in ends if header.endswith(f"_{e}") or header == e == "rpm"), key=len, default="")
-    return FileColumn(header, header.removesuffix(f"_{end}").lower().replace(" ", "_") if end else header.lower(), end)
+    words = header.removesuffix(f"_{end}").lower().replace(" ", "_") if end else header.lower()
+    end, factor = DRIVEN_IN.get(end, (end, 1.0))
+    return FileColumn(header, words, end, "", factor)
 
 
 def quantity_of(column: FileColumn) -> str:

@@ -272,10 +272,10 @@ def without_turns(table: CsvTable, header: str, raw: Array, unwrap: bool) -> Arr
 
 
 def input_factor(header: str, unit: str, table: CsvTable) -> float:
-    """Return what turns the column of an input into SI: what is not an angle and no turning speed is taken as it is."""
+    """Return what turns the column of an input into SI: a column without an end of its unit is taken as it is."""
     if header.endswith(("_deg", "_deg_s")):
         return DEGREE
-    ends = SUFFIXES[unit] if unit in ("rad", "rad/s") else {}
+    ends = SUFFIXES.get(unit, {})
     return table.factor(header, next((factor for end, factor in ends.items() if header.endswith(f"_{end}")), 1.0))
 
 

@@ -29,7 +29,8 @@ LARGEST_CELL = 1e30
 LONGEST_HEADER = 1 << 16
 TIME_HEADER = "time_s"
 KNOWN_QUANTITIES = ("angular_velocity", "velocity", "time", "drive", "angle", "position")
-FURTHER = ("_rpm", "_turns", "_turns_s", "_counts", "_counts_s", "_m_min")
+FURTHER = ("_rpm", "_turns", "_turns_s", "_counts", "_counts_s", "_m_min", "_cm", "_cm_s", "_km_h", "_mA", "_mV", "_kV",
+           "_kN", "_mN_m", "_kN_m")  # fmt: skip
 # header of a position -> unit of the speed that it belongs to, factor; counts: see `CsvTable.factor`
 POSITIONS = {f"position_{end}": ("m/s", factor) for end, factor in SUFFIXES["m"].items()}
 POSITIONS |= {f"angle_{end}": ("rad/s", factor) for end, factor in SUFFIXES["rad"].items()}
@@ -217,6 +218,11 @@ def output_columns(table: CsvTable, plant: Plant) -> tuple[Plant, dict[Output, s
     known = {o: header for o, header in headers.items() if header is not None}
     if not known:
         raise missing(table, "output", [c for o in plant.outputs for c in o.factors])
+    for output in plant.outputs:
+        alike = [h for h in table.headers if h == output.name or h.startswith(f"{output.name}_")]
+        if output not in known and alike:
+            warnings.warn(f"{table.file}: column {quoted(alike[0])} is not read as output '{output.name}', "
+                          f"{' or '.join(output.factors)} is expected", RecordWarning, stacklevel=2)  # fmt: skip
     return plant, known
 
 
