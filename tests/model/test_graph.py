@@ -148,6 +148,8 @@ DECLARED = {
         lambda: (Model(AXIS) + Effect("e", (Parameter("c", "effort / speed", 0.0, 1.0),), {"torque": zero})).parameters,
         "unit 'effort / speed' is not a product of scales: words joined by"),
     "name": (lambda: replace(AXIS, quantities={"a__b": zero}), "quantity, port or alias 'a__b' is not a usable name"),
+    "number for a function": (lambda: State("q", "m", zero, 0.0), "state 'q', initial value is 0.0: a function of"),
+    "number for a quantity": (lambda: replace(AXIS, quantities={"a": 1.0}), "quantity 'a' is 1.0: a function of"),
     "circle": (circle, "the equations run in a circle: a -> b -> c -> a; use a state or an earlier"),
     "unknown": (unknown, "plant 'driven_axis', quantity 'drive_effort', asks for 'voltage', which"),
 }  # fmt: skip

@@ -14,6 +14,13 @@ SIGN_WIDTH = Parameter("width", "speed", 0.0005, 0.05, fixed=0.005, note="speed 
 SIZE_WIDTH = replace(SIGN_WIDTH, note="speed over which the size of speed is smoothed")
 
 
+def check_equation(equation: Any, where: str) -> None:
+    """Refuse what cannot be called; where: what declares it."""
+    if not callable(equation):
+        raise ModelError(f"{where} is {equation!r}: a function of numbers is expected, for a number `def at_rest(): "
+                         "return 0.0`")  # fmt: skip
+
+
 @dataclass(frozen=True)
 class State:
     """Declare one quantity that is integrated in time.
@@ -31,6 +38,8 @@ class State:
 
     def __post_init__(self) -> None:
         check_name(self.name, "state")
+        check_equation(self.rate, f"state '{self.name}', rate")
+        check_equation(self.initial, f"state '{self.name}', initial value")
 
 
 @dataclass(frozen=True)
@@ -47,6 +56,7 @@ class Guard:
 
     def __post_init__(self) -> None:
         check_name(self.name, "guard")
+        check_equation(self.function, f"guard '{self.name}'")
 
 
 @dataclass(frozen=True)
@@ -114,6 +124,8 @@ class Effect:
             raise ModelError(f"effect '{self.name}' cannot have this name: {', '.join(RESERVED_WORDS)} are taken")
         if not self.adds:
             raise ModelError(f"effect '{self.name}' adds to no port: at least one is expected in `adds`")
+        for port, equation in self.adds.items():
+            check_equation(equation, f"effect '{self.name}', what it adds to '{port}',")
         own = (self.parameters, self.states, self.guards, self.delays)
         names = [one.name for group in own for one in group]
         twice = sorted({n for n in names if names.count(n) > 1})

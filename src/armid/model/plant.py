@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from armid.errors import ModelError, nearest
-from armid.model.effect import Equation, Guard, State
+from armid.model.effect import Equation, Guard, State, check_equation
 from armid.model.parameter import Parameter, Scales, check_name
 from armid.units import SUFFIXES
 
@@ -270,6 +270,8 @@ class Plant:
             object.__setattr__(self, "aliases", {**self.aliases, "voltage": volts[0]})
         for name in (*self.quantities, *self.ports, *self.aliases):
             check_name(name, "quantity, port or alias")
+        for name, equation in self.quantities.items():
+            check_equation(equation, f"plant '{self.name}', quantity '{name}'")
         twice = sorted({n for n in self.declared if self.declared.count(n) > 1})
         if twice:
             raise ModelError(f"plant '{self.name}' declares '{twice[0]}' twice: each name once is expected")
