@@ -68,7 +68,8 @@ def loop_details(name="arm", n_records=2, n_points=300):
     own = {"p0": {"value": 3.0e6, "low": 2.9e6, "high": 3.1e6}}
     models = [{"model": f"{name}_x", "probability": 0.5, "parameters": own}]
     return {
-        "made_by": made_by(f"armid close-loop {name}"), "versions": {"armid": "0"}, "conclusion": f"It lacks {name}.",
+        "made_by": made_by(f"armid close-loop {name}"), "versions": {"armid": "0"},
+        "headline": "Effects cannot be told apart", "conclusion": f"It lacks {name}.",
         "shifts": [f"{name} was bent"], "doubts": [],
         "diagnosis": {"before": {"train": [f"More than noise in {name}."], "holdout": None}, "after": None},
         "missing": [], "equations": {"before": f"{name}\n  torque = 0", "after": f"{name} + x\n  torque = x\n  end"},

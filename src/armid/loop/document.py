@@ -178,7 +178,7 @@ def loop_document(
 
 def answer(report: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, ...]:
     """Return what is probable, the verdict, error before and after, and which parameters are to be trusted."""
-    second = f"{VERDICTS[report['verdict']]}: {details['conclusion']}"
+    second = f"{details['headline']}: {details['conclusion']}"
     parameters = report["parameters"]["after"]
     sure = [f"{name} = {value_text(p)}" for name, p in parameters.items() if p["trusted"]]
     exact = report["taken_as_exact"]
@@ -344,6 +344,7 @@ def details_of(loop: ClosedLoop) -> dict[str, Any]:
     }  # fmt: skip
     return plain({
         "versions": versions_of(PACKAGES_OF_IDENTIFY),
+        "headline": headline(loop),
         "conclusion": conclusion(loop),
         "shifts": (shift_sentences(before, after) if loop.steps else [])
         + ([] if loop.verdict == NO_DISCREPANCY else constant_sentences(in_force)),
@@ -376,6 +377,12 @@ def models_of(inference: Inference) -> list[dict[str, Any]]:
                 "parameters": {n: {"value": values[n], "low": i.low, "high": i.high} for n, i in known.items()},
             }  # fmt: skip
     return sorted(entries.values(), key=lambda entry: -entry["probability"])
+
+
+def headline(loop: ClosedLoop) -> str:
+    """Return the verdict in a few words."""
+    stands = loop.withdrawn is not None and not loop.after.fails_to_carry_over
+    return "Withdrawn" if loop.verdict == CARRIES_NOT and stands else VERDICTS[loop.verdict]
 
 
 def conclusion(loop: ClosedLoop) -> str:
@@ -507,8 +514,9 @@ def carried_sentence(loop: ClosedLoop) -> str:
     worse = unseen.errors.joint_nrmse / last.errors.joint_nrmse - 1.0
     names = " + ".join(s.effect for s in loop.withdrawn.steps)
     stands = f"the model with {' + '.join(loop.effects)}" if loop.effects else "the declared model"
+    left = "" if any(over_noise(loop.after.train, last)) else " What it leaves of the records held out is noise."
     return (f"Of all names {names} suits the train records best, but the records held out are simulated {worse:.0%} "
-            f"worse with it ({missed}): it is withdrawn, and {stands} stands.")  # fmt: skip
+            f"worse with it ({missed}): it is withdrawn, and {stands} stands.{left}")  # fmt: skip
 
 
 def doubtful(loop: ClosedLoop) -> str:
