@@ -262,6 +262,21 @@ def test_a_constant_that_is_known_roughly_is_looked_for_as_an_effect_is(axis):
     assert slope.low < 5.0 < slope.high
 
 
+def test_a_constant_without_a_tolerance_may_stand_for_an_effect(axis):
+    """The gain is declared 25 % too high; of nothing else does the drive depend. With a tolerance of 0 it is exact."""
+    text = "[constants]\ngain = 1.25\n[parameters.mass]\nfixed = 2.0\n"
+    unsaid, exact = (armid.close_loop(axis(text + more), effects=["viscous"], candidates=["drive_gain"],
+                                      bounds={"viscous.slope": (0.0, 20.0)})
+                     for more in ("", "[tolerances]\ngain = 0.0\n"))  # fmt: skip
+    assert (unsaid.verdict, exact.verdict) == ("cannot_tell_apart", "explained")
+    assert [step.claimed for found in (unsaid, exact) for step in found.steps] == [False, True]
+    assert unsaid.steps[0].constants == {"gain": pytest.approx(-0.2, rel=0.03)}
+    assert exact.steps[0].constants == {}
+    assert "drive_gain cannot be told from gain 20." in conclusion(unsaid)
+    assert "Give the tolerance of gain, 0 where it is exact." in conclusion(unsaid)
+    assert not any(e.trusted for e in unsaid.after.estimates)
+
+
 def test_what_the_records_cannot_show_widens_an_interval_as_far_as_it_is_probable(axis):
     """Force, mass and friction that grow alike leave the motion as it is.
 
@@ -307,7 +322,8 @@ def test_records_that_look_wrong_are_told_and_nothing_is_looked_for(axis, monkey
 def concluded(verdict, effects=(), claimed=(), alternatives=(), moved=0.0, shows_on_train=False, ratios=()):
     """Return what is said first of a loop that ended with a verdict and left more than noise."""
     steps = [
-        SimpleNamespace(effect=e, claimed=e in claimed, alternatives=alternatives, probability=0.6) for e in effects
+        SimpleNamespace(effect=e, claimed=e in claimed, alternatives=alternatives, probability=0.6, constants={})
+        for e in effects
     ]
     return conclusion(SimpleNamespace(
         verdict=verdict, effects=effects, steps=steps,

@@ -11,15 +11,16 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from armid.inference.candidates import EffectKey
-from armid.inference.checks import is_significant
-from armid.inference.decisions import HOPELESS, REFITTED
+from armid.estimation.constants import NAMED, Product
+from armid.inference.candidates import CONSTANT, EffectKey
+from armid.inference.checks import is_significant, square_along
+from armid.inference.decisions import HOPELESS, REFITTED, WINDOW
 from armid.inference.evidence import Expansion, Forecast, Scale, expansion_of, forecast, log_evidence, scale_of
 from armid.inference.hypothesis import Hypotheses, Hypothesis, Proposal, log_prior
 from armid.inference.kinds import drifts, effects
 from armid.inference.library import Library
-from armid.inference.model import UNTOLD, Fit, fit_from, start_of, unless_diverged
-from armid.inference.unknowns import Unknown, freed, projected
+from armid.inference.model import UNTOLD, Fit, beyond, decomposed, fit_from, start_of, unless_diverged
+from armid.inference.unknowns import Unknown, constant, freed, projected
 from armid.model import Array
 
 Trial = tuple[Hypotheses, Callable[[], Fit | None]]
@@ -29,6 +30,8 @@ N_OTHERS, N_PAIRS, N_SWAPPED, N_EXCHANGED = 3, 3, 3, 2
 N_LEADING = 24
 # Mean square of the residual over that of the noise below which a search counts as near the noise.
 NEAR_NOISE = 2.0
+# Deviation of a constant that counts as exact and is tried instead of an effect, and how many of them are.
+DOUBTED, N_INSTEAD = 0.1, 2
 # Strengths at which a swapped effect is tried, as multiples of the linear guess.
 STRENGTHS_OF_FORM = 2.0 ** np.arange(-4, 5)
 
@@ -194,6 +197,36 @@ def without(fit: Fit, hypothesis: Hypothesis, library: Library, weight: float) -
     assert base is not None
     return unless_diverged(lambda: freed(fit, base, kept, weight, rough=True) if kept else
                            fit_from(base, fit.active, [fit.z], rough=True))  # fmt: skip
+
+
+def constants_instead(
+    exploration: Exploration, model: Hypotheses, hypothesis: Hypothesis, names: Sequence[str]
+) -> dict[str, float]:
+    """Return the constants that explain the records as well as an effect of a model, and by which share they are off.
+
+    names: of constants that count as exact. Those that would leave least to first order are fitted in its place.
+    Nothing stands in for a constant that is known roughly.
+    """
+    if not names or hypothesis.name.startswith(CONSTANT):
+        return {}
+    scale, fit = exploration.scale(), exploration.fits[model]
+    less = exploration.fits.get(model - {hypothesis}) or without(fit, hypothesis, exploration.library, scale.weight)
+    if less is None:
+        return {}
+    kept = [f.unknown for f in less.others]
+    known = np.column_stack([less.jacobian, *(f.column for f in less.others)])
+    basis, found = decomposed(known)[0], dict[str, float]()
+
+    def explained(product: Product) -> float:
+        return square_along(beyond(basis, product.slope[:, np.newaxis]), less.residual)[0]
+
+    tried = sorted(less.products(dict.fromkeys(names, DOUBTED)), key=lambda p: -explained(p))[:N_INSTEAD]
+    for product in tried:
+        unknowns = [*kept, constant(product)]
+        again = unless_diverged(partial(freed, less, less.base or less.records, unknowns, scale.weight))
+        if again is not None and scale.weight * (again.chi2 - fit.chi2) < 2.0 * WINDOW:
+            found[product.public.removeprefix(NAMED)] = again.constants[product.names[0]]
+    return found
 
 
 def name_of_size(hypothesis: Hypothesis) -> str:

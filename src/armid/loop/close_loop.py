@@ -32,7 +32,7 @@ from armid.inference.model import (
     problem_about,
     unless_diverged,
 )
-from armid.inference.moves import without
+from armid.inference.moves import constants_instead, without
 from armid.inference.whitening import WhiteRecords
 from armid.loop.result import (
     CARRIES_NOT,
@@ -40,6 +40,7 @@ from armid.loop.result import (
     EXPLAINED,
     HELD,
     IMPLAUSIBLE,
+    INSTEAD,
     NO_DISCREPANCY,
     PARTLY,
     TOO_ALIKE,
@@ -137,14 +138,14 @@ def close_loop(
     told("judging on the records held out")
     path = [frozenset[Hypothesis]()] if implausible else path_of(inference)
     judged = [judge(inference, hypotheses, campaign, within) for hypotheses in path]
-    steps = steps_of(inference, path, judged)
+    steps = steps_of(inference, path, judged, campaign.taken_as_exact)
     kept = confirmed(judged)
     unclaimed = tuple(replace(step, claimed=False) for step in steps[kept:])
     withdrawn = Withdrawn(unclaimed, judged[-1]) if unclaimed else None
     if kept < len(path) - 1:  # a model of faults alone has no step
         inference, path = inference.without(path[-1] - path[kept], path[kept]), path[: kept + 1]
         judged = rejudged(inference, path, judged, within)
-        steps = steps_of(inference, path, judged)
+        steps = steps_of(inference, path, judged, campaign.taken_as_exact)
     after, before = judged[kept], judged[0]
     accused = [h for h in path[kept] if inference.posterior.probability(*h.public) >= MENTIONED]
     suspects = [*record_faults_of(accused, path[kept], inference), *broken_records(campaign.records)]
@@ -156,7 +157,10 @@ def close_loop(
         inference = inference.after_holdout(over_noise(after.train, after.holdout))
         judged = rejudged(inference, path, judged, within)
         after, before = judged[kept], judged[0]
-        steps = tuple(replace(step, claimed=False) for step in steps_of(inference, path, judged))
+        steps = steps_of(inference, path, judged, campaign.taken_as_exact)
+        steps = tuple(replace(step, claimed=False) for step in steps)
+    if any(step.constants for step in steps[:kept]):
+        after = doubted(after, INSTEAD)
     errors = {
         name: [errors_on(records, j, library) for records in (campaign.train, campaign.holdout)] if suspects else
         [j.train_error, j.holdout_error] for name, j in (("before", before), ("after", after))
@@ -174,6 +178,12 @@ def close_loop(
     return ClosedLoop(campaign, verdicts[0], verdicts[1:], before, after, steps[:kept], withdrawn, advice, next_steps,
                       known_together(in_force, inference.exploration.library), tuple(suspects), errors, inference,
                       missing)  # fmt: skip
+
+
+def doubted(judged: Judgement, why: str) -> Judgement:
+    """Return a judgement whose parameters are not to be trusted."""
+    estimates = (e if e.low is None else replace(e, doubts=(*e.doubts, why)) for e in judged.estimates)
+    return replace(judged, estimates=tuple(estimates))
 
 
 def does_as_well(fit: Fit, issue: DataIssue) -> bool:
@@ -224,8 +234,13 @@ def rejudged(
     return [replace(j, estimates=estimates(inference, m, j.fit, j.significant, within)) for m, j in pairs]
 
 
-def steps_of(inference: Inference, path: Sequence[Hypotheses], judged: Sequence[Judgement]) -> tuple[Step, ...]:
-    """Return a step for each effect of the model in force; a model of faults alone has none."""
+def steps_of(
+    inference: Inference, path: Sequence[Hypotheses], judged: Sequence[Judgement], exact: Sequence[str]
+) -> tuple[Step, ...]:
+    """Return a step for each effect of the model in force; a model of faults alone has none.
+
+    exact: constants without a tolerance.
+    """
     steps, exploration = [], inference.exploration
     candidates, fit = exploration.library.candidates, exploration.fits[inference.in_force]
     for model, last, after in zip(path[1:], path, judged[1:], strict=False):
@@ -236,8 +251,9 @@ def steps_of(inference: Inference, path: Sequence[Hypotheses], judged: Sequence[
         names = tuple(inference.partners(inference.in_force, hypothesis))
         settled = fit.has_arrived and not fit.is_at_a_limit(hypothesis.means)
         port = ", ".join(candidates[hypothesis.means].adds)
-        steps.append(Step(hypothesis.name, port, names, False, p >= CLAIMED and settled, p, after,
-                          hypothesis.form))  # fmt: skip
+        instead = constants_instead(exploration, inference.in_force, hypothesis, exact)
+        is_claimed = p >= CLAIMED and settled and not instead
+        steps.append(Step(hypothesis.name, port, names, False, is_claimed, p, after, hypothesis.form, instead))
     return tuple(steps)
 
 
@@ -267,7 +283,7 @@ def verdicts_of(
     unknown = post.unknown_is_likely
     verdicts = [CARRIES_NOT] if withdrawn is not None or after.fails_to_carry_over else []
     verdicts += [DISAGREES] if any(h.kind in ("record", "drift") for h in accused) else []
-    in_doubt = any(s.probability < CLAIMED for s in steps) if steps else post.nothing < MENTIONED
+    in_doubt = any(s.probability < CLAIMED or s.constants for s in steps) if steps else post.nothing < MENTIONED
     verdicts += [TOO_ALIKE] if in_doubt and not unknown and withdrawn is None and DISAGREES not in verdicts else []
     if unknown:
         verdicts.append(PARTLY if steps else UNEXPLAINED)

@@ -192,6 +192,12 @@ def answer(report: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, 
             " ".join(texts) or "No parameter was identified.")  # fmt: skip
 
 
+def moved_constants(constants: Mapping[str, float]) -> list[str]:
+    """Return constants that would do what an effect does, in words."""
+    return [f"{name} {abs(share):.1%} {'above' if share > 0.0 else 'below'} its declared value"
+            for name, share in constants.items()]  # fmt: skip
+
+
 def chances_sentence(report: Mapping[str, Any]) -> str:
     """Return the probabilities in one line, and among how many effects they were asked for."""
     named, known = report["probabilities"]["among"]
@@ -236,7 +242,8 @@ def step_table(report: Mapping[str, Any]) -> Table:
         errors = ["none" if step["error"][which] is None else
                   f"{rmse_text(last[which], unit)} -> {rmse_text(step['error'][which], unit)}"
                   for which in ("holdout", "train")]  # fmt: skip
-        alternatives = ", ".join(step["alternatives"]) or "none"
+        moved = [f"{name} {share:+.1%}" for name, share in step["constants"].items()]
+        alternatives = ", ".join([*step["alternatives"], *moved]) or "none"
         claimed = "" if step["claimed"] else " (candidate)"
         form = f":{step['form']}" if step.get("form") else ""
         rows.append((step["effect"] + form + claimed, *errors, alternatives, "; ".join(own), step["port"]))
@@ -523,11 +530,14 @@ def doubtful(loop: ClosedLoop) -> str:
     """Say between what these records cannot decide."""
     if not loop.steps:
         return "No single answer is probable: these records tell too little."
-    texts = [f"{s.effect} cannot be told from {' or '.join(s.alternatives)}" for s in loop.steps if s.alternatives]
+    others = {s.effect: [*s.alternatives, *moved_constants(s.constants)] for s in loop.steps}
+    texts = [f"{name} cannot be told from {' or '.join(other)}" for name, other in others.items() if other]
     texts += [f"{s.effect} has a probability of {s.probability:.2f}" for s in loop.steps
-             if not (s.claimed or s.alternatives)]  # fmt: skip
+             if not (s.claimed or others[s.effect])]  # fmt: skip
     rest = "a significant discrepancy remains, and" if loop.after.significant else "what remains is noise, but"
     judged = "" if loop.campaign.holdout else " No record was held out to judge it."
+    asked = list(dict.fromkeys(name for s in loop.steps for name in s.constants))
+    judged += f" Give the tolerance of {' and '.join(asked)}, 0 where it is exact." if asked else ""
     return f"With {' + '.join(loop.effects)} {rest} on these records {'; '.join(texts)}.{judged}"
 
 

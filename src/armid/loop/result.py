@@ -1,7 +1,7 @@
 """What the closed loop found, for programs: the result, its doubts, records that differ, and report.json."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar
 
@@ -38,6 +38,7 @@ REMAINS, HELD = "a significant discrepancy remains", "it rests at its bound"
 # A shape that armid sets free by itself, such as the width of a sign: nobody needs to widen its range.
 SEARCHED = "it lies at the end of the range that was searched"
 NOT_IDENTIFIED = "it was not identified: its value is declared"
+INSTEAD = "a constant without a tolerance may be off instead"
 # Listed causes of the width of an interval, and listed models.
 MOST_CAUSES, MOST_LISTED = 2, 30
 # Of the keys of report.json: 2 came with probabilities.
@@ -159,7 +160,8 @@ class Step:
 
     alternatives: names of the effects that may stand in its place, the most probable first. empirical: whether it is a
     term without a name. claimed: whether its name is claimed. probability: that the machine has it. form: word of its
-    published form, "" for the first: `--effects NAME:FORM` declares it.
+    published form, "" for the first: `--effects NAME:FORM` declares it. constants: those without a
+    tolerance that would explain the records as well -> by which share each would be off.
     """
 
     effect: str
@@ -170,6 +172,7 @@ class Step:
     probability: float
     after: Judgement
     form: str = ""
+    constants: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -345,6 +348,7 @@ def among(library: Library) -> list[int]:
 def step_entry(step: Step) -> dict[str, Any]:
     return {
         "effect": step.effect, "form": step.form, "port": step.port, "alternatives": step.alternatives,
+        "constants": step.constants,
         "empirical": step.empirical, "claimed": step.claimed, "probability": step.probability,
         "error": errors_of(step.after), "parameters": step.after.entries,
     }  # fmt: skip
