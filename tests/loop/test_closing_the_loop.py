@@ -270,8 +270,8 @@ def test_a_constant_without_a_tolerance_may_stand_for_an_effect(axis):
                      for more in ("", "[tolerances]\ngain = 0.0\n"))  # fmt: skip
     assert (unsaid.verdict, exact.verdict) == ("cannot_tell_apart", "explained")
     assert [step.claimed for found in (unsaid, exact) for step in found.steps] == [False, True]
-    assert unsaid.steps[0].constants == {"gain": pytest.approx(-0.2, rel=0.03)}
-    assert exact.steps[0].constants == {}
+    assert unsaid.steps[0].instead == {"gain": pytest.approx(-0.2, rel=0.03)}
+    assert exact.steps[0].instead == {}
     assert "drive_gain cannot be told from gain 20." in conclusion(unsaid)
     assert "Give the tolerance of gain, 0 where it is exact." in conclusion(unsaid)
     assert not any(e.trusted for e in unsaid.after.estimates)
@@ -322,7 +322,7 @@ def test_records_that_look_wrong_are_told_and_nothing_is_looked_for(axis, monkey
 def concluded(verdict, effects=(), claimed=(), alternatives=(), moved=0.0, shows_on_train=False, ratios=()):
     """Return what is said first of a loop that ended with a verdict and left more than noise."""
     steps = [
-        SimpleNamespace(effect=e, claimed=e in claimed, alternatives=alternatives, probability=0.6, constants={})
+        SimpleNamespace(effect=e, claimed=e in claimed, alternatives=alternatives, probability=0.6, instead={})
         for e in effects
     ]
     return conclusion(SimpleNamespace(

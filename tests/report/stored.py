@@ -42,7 +42,7 @@ def loop_report(name="arm"):
     before = {"p0": parameter(3.1e6, "Pa", False), "n": parameter(1.3, sure=False)}
     after = {"p0": parameter(3.0e6, "Pa", cause=name), "n": parameter(1.4), f"{name}_x.level": parameter(40.0, "N m")}
     step = {"effect": f"{name}_x", "port": "torque", "alternatives": ["other"], "empirical": False, "claimed": False,
-            "constants": {}, "probability": 0.5, "error": {"train": errors(0.005), "holdout": errors(0.006)},
+            "instead": {}, "probability": 0.5, "error": {"train": errors(0.005), "holdout": errors(0.006)},
             "parameters": after}  # fmt: skip
     chances = {"effects": {f"{name}_x": 0.5, "other": 0.45}, "effects_beside_unknown": {}, "sets": [],
                "nothing": 0.01, "unknown": 0.04, "records": {f"late@{name}.csv": 0.02}, "drifts": {},

@@ -159,7 +159,7 @@ def close_loop(
         after, before = judged[kept], judged[0]
         steps = steps_of(inference, path, judged, campaign.taken_as_exact)
         steps = tuple(replace(step, claimed=False) for step in steps)
-    if any(step.constants for step in steps[:kept]):
+    if any(step.instead for step in steps[:kept]):
         after = doubted(after, INSTEAD)
     errors = {
         name: [errors_on(records, j, library) for records in (campaign.train, campaign.holdout)] if suspects else
@@ -283,7 +283,7 @@ def verdicts_of(
     unknown = post.unknown_is_likely
     verdicts = [CARRIES_NOT] if withdrawn is not None or after.fails_to_carry_over else []
     verdicts += [DISAGREES] if any(h.kind in ("record", "drift") for h in accused) else []
-    in_doubt = any(s.probability < CLAIMED or s.constants for s in steps) if steps else post.nothing < MENTIONED
+    in_doubt = any(s.probability < CLAIMED or s.instead for s in steps) if steps else post.nothing < MENTIONED
     verdicts += [TOO_ALIKE] if in_doubt and not unknown and withdrawn is None and DISAGREES not in verdicts else []
     if unknown:
         verdicts.append(PARTLY if steps else UNEXPLAINED)

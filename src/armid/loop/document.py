@@ -242,7 +242,7 @@ def step_table(report: Mapping[str, Any]) -> Table:
         errors = ["none" if step["error"][which] is None else
                   f"{rmse_text(last[which], unit)} -> {rmse_text(step['error'][which], unit)}"
                   for which in ("holdout", "train")]  # fmt: skip
-        moved = [f"{name} {share:+.1%}" for name, share in step["constants"].items()]
+        moved = [f"{name} {share:+.1%}" for name, share in step["instead"].items()]
         alternatives = ", ".join([*step["alternatives"], *moved]) or "none"
         claimed = "" if step["claimed"] else " (candidate)"
         form = f":{step['form']}" if step.get("form") else ""
@@ -530,13 +530,13 @@ def doubtful(loop: ClosedLoop) -> str:
     """Say between what these records cannot decide."""
     if not loop.steps:
         return "No single answer is probable: these records tell too little."
-    others = {s.effect: [*s.alternatives, *moved_constants(s.constants)] for s in loop.steps}
+    others = {s.effect: [*s.alternatives, *moved_constants(s.instead)] for s in loop.steps}
     texts = [f"{name} cannot be told from {' or '.join(other)}" for name, other in others.items() if other]
     texts += [f"{s.effect} has a probability of {s.probability:.2f}" for s in loop.steps
              if not (s.claimed or others[s.effect])]  # fmt: skip
     rest = "a significant discrepancy remains, and" if loop.after.significant else "what remains is noise, but"
     judged = "" if loop.campaign.holdout else " No record was held out to judge it."
-    asked = list(dict.fromkeys(name for s in loop.steps for name in s.constants))
+    asked = list(dict.fromkeys(name for s in loop.steps for name in s.instead))
     judged += f" Give the tolerance of {' and '.join(asked)}, 0 where it is exact." if asked else ""
     return f"With {' + '.join(loop.effects)} {rest} on these records {'; '.join(texts)}.{judged}"
 

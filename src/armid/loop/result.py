@@ -160,7 +160,7 @@ class Step:
 
     alternatives: names of the effects that may stand in its place, the most probable first. empirical: whether it is a
     term without a name. claimed: whether its name is claimed. probability: that the machine has it. form: word of its
-    published form, "" for the first: `--effects NAME:FORM` declares it. constants: those without a
+    published form, "" for the first: `--effects NAME:FORM` declares it. instead: constants without a
     tolerance that would explain the records as well -> by which share each would be off.
     """
 
@@ -172,7 +172,7 @@ class Step:
     probability: float
     after: Judgement
     form: str = ""
-    constants: Mapping[str, float] = field(default_factory=dict)
+    instead: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -348,7 +348,7 @@ def among(library: Library) -> list[int]:
 def step_entry(step: Step) -> dict[str, Any]:
     return {
         "effect": step.effect, "form": step.form, "port": step.port, "alternatives": step.alternatives,
-        "constants": step.constants,
+        "instead": step.instead,
         "empirical": step.empirical, "claimed": step.claimed, "probability": step.probability,
         "error": errors_of(step.after), "parameters": step.after.entries,
     }  # fmt: skip
