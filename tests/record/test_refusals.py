@@ -91,6 +91,7 @@ TOML = {
     "missing file key": (GOOD.replace("file =", "# file ="), ["campaign.toml, record 1", "'file'", "missing"]),
     "unknown role": (GOOD.replace('"train"', '"test"'), ["'role' is 'test'", "'train' or 'holdout'"]),
     "no train record": (GOOD.replace('"train"', '"holdout"'), ["campaign.toml", "'train'", "at least one"]),
+    "key below a table": ('[tolerances]\nV0 = 0.1\n' + GOOD, ["key 'name' stands under [tolerances], a line above"]),
     "no word of the shell": (GOOD.replace("shell = true", ""), ["'shell' is missing", "true or false"]),
     "text for a boolean": (GOOD.replace("shell = true", 'shell = "yes"'), ["'shell' is 'yes'", "true or false"]),
     "endless integer": (GOOD.replace("28.0", "9" * 5000), ["campaign.toml", "TOML"]),

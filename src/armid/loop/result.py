@@ -462,7 +462,7 @@ def fault_sentence(s: RecordFault) -> str:
         return f"{s.record} looks like a record of another load, or of other inputs than it tells."
     if s.kind == "trend":
         grew, (low, high) = ("larger" if s.value > 0.0 else "smaller"), along(s.value, s.low, s.high)
-        size = f"{factor * abs(s.value):.3g}{unit} ({factor * low:.3g} to {factor * high:.3g})"
+        size = sized(factor * abs(s.value), factor * low, factor * high, unit)
         names = " or ".join(s.parameter.split(", "))
         return (f"{names} is {size} {grew} in {s.record}, the last record, than in the first, and changes from each to "
                 "the next, as in a machine that warms up, wears or runs in; corrected.")  # fmt: skip
@@ -470,10 +470,16 @@ def fault_sentence(s: RecordFault) -> str:
         word = "late" if s.value > 0.0 else "early"
         low, high = along(s.value, 1e3 * s.low, 1e3 * s.high)
         where = f"{s.record}, {s.output}: its sensor is" if s.output else f"{s.record}: starts"
-        return f"{where} {1e3 * abs(s.value):.3g} ms {word} ({low:.3g} to {high:.3g}); corrected."
+        return f"{where} {sized(1e3 * abs(s.value), low, high, f' ms {word}')}; corrected."
     words = {"start": "starts elsewhere than declared, by", "offset": "its sensor is off by",
              "gain": "its gain is off by", "drift": "its sensor drifts by",
              "clock": "its clock is fast by a share of"}[s.kind]  # fmt: skip
     where = f"{s.record}, {s.output}" if s.output else s.record
-    size = f"{factor * s.value:.3g}{unit} ({factor * s.low:.3g} to {factor * s.high:.3g})"
+    size = sized(factor * s.value, factor * s.low, factor * s.high, unit)
     return f"{where}: {words} {size}; corrected."
+
+
+def sized(value: float, low: float, high: float, unit: str) -> str:
+    """Return a size with its interval, with as many digits as tell its ends apart."""
+    digits = next((n for n in range(3, 7) if f"{low:.{n}g}" != f"{high:.{n}g}"), 7)
+    return f"{value:.{digits}g}{unit} ({low:.{digits}g} to {high:.{digits}g})"

@@ -336,7 +336,9 @@ def validated(sheet: type[SheetT], table: object, where: str, further: Collectio
                 raise ArmidError(f"{where}: key {quoted(error.path)} is {quoted(error.found)}, {expected} is "
                                  "expected") from error  # fmt: skip
         elif is_required(f):
-            raise ArmidError(f"{where}: key '{f.name}' is missing, {expected} is expected")
+            below = next((t for t, inner in table.items() if isinstance(inner, dict) and f.name in inner), "")
+            found = f"stands under [{below}], a line above the first table" if below else f"is missing, {expected}"
+            raise ArmidError(f"{where}: key '{f.name}' {found} is expected")
     if further:
         values["keys"] = {name: table[name] for name in further if name in table}
     return sheet(**values)
