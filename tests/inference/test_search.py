@@ -157,6 +157,22 @@ def test_the_most_probable_model_comes_next_that_is_neither_expanded_nor_outdone
     assert next_model(exploration(posteriors, "ac", monkeypatch=monkeypatch)) is None
 
 
+def test_what_was_only_forecast_is_fitted_before_it_counts(monkeypatch):
+    """The first that lead may be refused where they are fitted; those behind them are as wrong."""
+    found, asked = exploration({"": 0.0, "z": -WINDOW - 1.0}, monkeypatch=monkeypatch), []
+    ahead = [
+        Mock(posterior=p, proposal=Mock(hypothesis=Hypothesis("record", n))) for n, p in zip("abcd", (9, 30, -9, 1))
+    ]
+    found.forecasts = {model(""): ahead, model("z"): ahead}
+    found.noise, found.refused, found.take_or_refuse = Mock(), set(), lambda key, fit: found.refused.add(key)
+    monkeypatch.setattr(search, "expansion_of", Mock())
+    monkeypatch.setattr(search, "limit_of", Mock())
+    monkeypatch.setattr(search, "trial_of", lambda _, of, about, one, limit: [
+        (of | {one.proposal.hypothesis}, lambda: asked.append(one.proposal.hypothesis.name))])  # fmt: skip
+    assert not search.fit_what_counts(found)
+    assert asked == ["b", "a", "d"]
+
+
 def test_a_model_in_another_form_has_the_same_neighbours():
     root, tanh = (frozenset([Hypothesis("effect", "a", form)]) for form in ("root", "tanh"))
     assert has_expanded_form(tanh, 1.0, [(root, 0.0)])

@@ -52,8 +52,8 @@ MOST_EXPANDED, MOST_EFFECTS = 16, 8
 SAMPLES, FEWEST_EXPANDED, USUAL_CONSTANTS = 4_000, 8, 10
 # Far from the noise: expansions without a better model after which the search stops, as what is missing has no name.
 MOST_IN_VAIN = 4
-# Most expansions of a last model that was never expanded.
-MOST_ENDS = 3
+# Most expansions of a last model that was never expanded, and fits of what was only forecast and would count.
+MOST_ENDS, MOST_COUNTED = 3, 16
 # Most completions of one model in a row.
 MOST_COMPLETED = 4
 # Rivals that differ from the best model in one name and are completed.
@@ -81,6 +81,8 @@ def explore(library: Library, declared: Fit, most: int | None = None) -> Explora
             break
         # Drops reached this model: its own additions and swaps were never fitted.
         expand(exploration, best)
+        finish_all(exploration)
+    if fit_what_counts(exploration):
         finish_all(exploration)
     return exploration
 
@@ -134,6 +136,29 @@ def take_from_short_pieces(exploration: Exploration) -> None:
     for model, fit in zip(leaders, carried, strict=True):
         weight = exploration.scale().weight
         exploration.take(model, fit and with_constants(fit, constants, weight))
+
+
+def fit_what_counts(exploration: Exploration) -> bool:
+    """Fit what was only forecast and would be listed in the posterior; tell whether a model was added.
+
+    Forecasts that lead may be refused where they are fitted, and those behind them, as wrong, would count unasked.
+    """
+    before = len(exploration.fits)
+    for _ in range(MOST_COUNTED):
+        scale, ranked = exploration.scale(), exploration.ranked()
+        top = ranked[0][1]
+        known = exploration.fits.keys() | exploration.refused
+        near = [(model, value) for model, value in ranked if value > top - WINDOW]
+        waiting = [(value + f.posterior, model, f) for model, value in near
+                   for f in exploration.forecasts.get(model, ())
+                   if model | {f.proposal.hypothesis} not in known]  # fmt: skip
+        chance, model, ahead = max(waiting, key=lambda one: one[0], default=(-np.inf, None, None))
+        if model is None or ahead is None or not top + REFITTED < chance < np.inf:
+            break
+        about = expansion_of(exploration.fits[model], scale, exploration.library)
+        for key, make in trial_of(exploration, model, about, ahead, limit_of(exploration, scale)):
+            exploration.take_or_refuse(key, make())
+    return len(exploration.fits) > before
 
 
 def without_denied(exploration: Exploration, denied: Hypotheses, standing: Hypotheses) -> Exploration:
