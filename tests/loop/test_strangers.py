@@ -126,10 +126,10 @@ def test_the_number_of_teeth_is_looked_for_wherever_it_lies(tmp_path):
     library, fit = prepared(records.model(), records, {"torque_ripple": EFFECTS["torque_ripple"]})
     (key,) = library.candidates
     problem = records_with(fit, (key,), library)
-    places, share = waves_tried(fit, problem, key, library.declared_ranges(problem.model, key))
+    places, among = waves_tried(fit, problem, key, library.declared_ranges(problem.model, key))
     travel = max(np.ptp(r.measured) for r in records.train)
     assert np.abs(places["torque_ripple.waves"] - WAVES).min() < np.pi / travel
-    assert len(places["torque_ripple.waves"]) * share > 14.0
+    assert len(places["torque_ripple.waves"]) * among > 14.0
 
 
 def turning(x, fed):

@@ -109,11 +109,10 @@ def proposal(fit: Fit, hypothesis: Hypothesis, key: EffectKey, library: Library)
 def waves_tried(
     fit: Fit, records: WhiteRecords, key: EffectKey, ranges: Mapping[str, tuple[float, float]]
 ) -> tuple[dict[str, Array], float]:
-    """Return at which wave numbers an effect that repeats with position is tried, and the share that these are.
+    """Return at which wave numbers an effect that repeats with position is tried, and how many were looked at for each.
 
     Records of a travel L tell wave numbers apart that differ by pi/L. All of them are looked at to first order; those
-    that would leave least are tried. share: how many were looked at for each that is tried; nothing and 1 of an effect
-    without a wave number.
+    that would leave least are tried. Nothing and 1 for an effect without a wave number.
     """
     space, plant = records.space, records.model.plant
     mine = [n for n in space.free_names if key.owns(n) and records.model.parameters[n].null is None]
@@ -129,6 +128,8 @@ def waves_tried(
     alone = [a for a in grid if sum(v != a.null[p] for p, v in a.full.items() if p in a.null) == 1]
     alone = [a for a in alone if all(v >= a.null[p] for p, v in a.full.items() if p in a.null)]
     alone.sort(key=lambda a: a.full[waves[0]])
+    if not alone:  # no strength with an off value
+        return {}, 1.0
     each = len(alone) // n
     squares = []
     for first in range(0, len(alone), WAVES_AT_ONCE * each):
