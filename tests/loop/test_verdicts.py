@@ -177,12 +177,12 @@ def test_a_name_is_claimed_that_is_probable_and_whose_fit_is_settled(p, at_a_lim
     fit = SimpleNamespace(is_at_a_limit=lambda _: at_a_limit, has_arrived=has_arrived)
     object.__setattr__(inference, "exploration", SimpleNamespace(library=library, fits={model: fit}))
     after = Judgement(fit, None, (), None, None)
-    (only,) = steps_of(inference, [frozenset(), model], [None, after], ())
+    (only,) = steps_of(inference, [frozenset(), model], [None, after], lambda *_: {})
     assert (only.effect, only.port, only.claimed, only.empirical) == ("viscous", "torque, inertia", claimed, False)
     assert only.probability == pytest.approx(p)
     assert only.alternatives == (("coulomb",) if p < 0.99 else ())
     # a model of faults alone is not a step
-    assert steps_of(inference, [frozenset(), frozenset({LATE})], [None, after], ()) == ()
+    assert steps_of(inference, [frozenset(), frozenset({LATE})], [None, after], lambda *_: {}) == ()
 
 
 def test_a_limit_that_holds_a_parameter_is_told_and_an_interval_is_drawn_as_it_is():

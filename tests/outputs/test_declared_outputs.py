@@ -109,8 +109,8 @@ def test_a_column_that_has_the_name_of_an_output_and_no_unit_of_it_is_told(tmp_p
         warnings.simplefilter("always")
         campaign = read_campaign(folder, {"two_inertias": two_inertias})
     assert ("load_speed" in [o.name for o in campaign.plant.outputs]) != warned
-    said = [str(w.message) for w in caught if "is not read as output 'load_speed', load_speed_deg_s" in str(w.message)]
-    assert bool(said) == warned
+    texts = [str(w.message) for w in caught if "is not read as output 'load_speed', load_speed_deg_s" in str(w.message)]
+    assert bool(texts) == warned
 
 
 def test_every_state_of_the_start_comes_from_the_outputs_unless_it_is_given(tmp_path):

@@ -28,7 +28,7 @@ from armid.record.sensor import FEWEST_REST_SAMPLES, sensor_of, stands_still
 from armid.record.table import CsvTable, missing, read_table
 from armid.registry import load_registry
 from armid.report.result import NewFiles
-from armid.units import SUFFIXES, UNIT_ENDS
+from armid.units import ENDS, SUFFIXES, UNIT_ENDS
 
 CATALOGUES = {"effect": "effects", "fitness": "fitness", "identifier": "identifiers", "plant": "plants",
               "analysis": "analyses"}  # fmt: skip
@@ -218,11 +218,10 @@ HEADERS = {
     ("drive", True): ("drive", ("V", "N", "N_m", "A"), "V"),
 }
 COMMAND, CURRENT = "command", "current_A"
-# Units of a drive with a prefix -> end of the unit, and what turns a number into it.
-DRIVEN_IN = {"mV": ("V", 1e-3), "kV": ("V", 1e3), "mA": ("A", 1e-3), "kN": ("N", 1e3), "mN m": ("N_m", 1e-3),
-             "mNm": ("N_m", 1e-3), "kNm": ("N_m", 1e3), "kN m": ("N_m", 1e3), "mN_m": ("N_m", 1e-3),
-             "kN_m": ("N_m", 1e3)}  # fmt: skip
 LINEAR, DRIVES = {*SUFFIXES["m"], *SUFFIXES["m/s"], "N"}, {"V", "A", "N", "N_m"}
+# Units of a drive with a prefix -> end of the unit, and what turns a number into it.
+DRIVEN_IN = {word: (UNIT_ENDS[unit], factor) for end, (unit, factor, words) in ENDS.items()
+             if UNIT_ENDS.get(unit) in DRIVES - {end} for word in (end, *words)}  # fmt: skip
 COUNT_ENDS = ("counts", "counts_s")
 TURNING_ENDS = {*SUFFIXES["rad/s"], *SUFFIXES["rad"]}
 # A machine is at rest as long as its signal is nearer to its first rows than so many times their range.

@@ -442,13 +442,15 @@ def band_tests(seen: Residuals) -> Iterator[Finding]:
     """
     coloured = not (seen.doubted or seen.data.blocks) and seen.data.rests_have_colour
     hum = mains_hum(seen)
-    whole = [bridged(x, r) for x, r in zip(seen.raw, seen.replays, strict=True)] if coloured else []
-    left = spectra(whole or scaled(seen, seen.renewed), seen, hum)
+    levels = seen.data.levels
+    whole = [bridged(x, r) / n.rms for x, r, n in zip(seen.raw, seen.replays, levels, strict=True)] if coloured else []
+    left = spectra(whole or seen.renewed, seen, hum)
     # an output with gaps may have no rest where another has one
-    still = [r.rest - np.mean(r.rest) if r.rest.size else r.rest for r in seen.data.each]
+    still = [(r.rest - np.mean(r.rest)) / n.rms if r.rest.size else r.rest
+             for r, n in zip(seen.data.each, levels, strict=True)]  # fmt: skip
     rests = spectra(still, seen, hum) if coloured else {}
     flat = 1.0 if seen.data.sized else float(np.mean(np.concatenate(seen.renewed) ** 2))
-    drawn = [] if coloured else [spectra(scaled(seen, draw), seen, hum) for draw in seen.rounded]
+    drawn = [] if coloured else [spectra(draw, seen, hum) for draw in seen.rounded]
     if drawn and not seen.data.sized:
         flat /= float(np.mean(np.concatenate(list(chain.from_iterable(seen.rounded))) ** 2))
     for band, values in sorted(left.items()):
@@ -462,10 +464,6 @@ def band_tests(seen: Residuals) -> Iterator[Finding]:
         high = BANDS_HZ[band + 1]
         where = f"{BANDS_HZ[band]:g} to {high:g} Hz" if np.isfinite(high) else f"above {BANDS_HZ[band]:g} Hz"
         yield Finding("frequency", where, ratio, chance(ratio, free, known))
-
-
-def scaled(seen: Residuals, white: Sequence[Array]) -> list[Array]:
-    return [level.rms * x for level, x in zip(seen.data.levels, white, strict=True)]
 
 
 def bridged(signal: Array, replay: Replay) -> Array:
@@ -506,16 +504,17 @@ def without_lines(signal: Array, frequencies: Sequence[float], interval: float) 
 def spectra(
     signals: Sequence[Array], seen: Residuals, without: Sequence[tuple[float, float]]
 ) -> dict[int, list[float]]:  # fmt: skip
-    """Return the ordinates of tapered periodograms of signals (one a record), band -> mean squares over the noise's.
+    """Return the ordinates of tapered periodograms, band -> mean squares.
 
-    without: stretches of frequency, (low, high) [Hz], that are left out.
+    signals: one a record, over the rms of its noise. without: stretches of frequency, (low, high) [Hz], that are left
+    out.
     """
     ordinates: dict[int, list[float]] = {}
-    for record, level, signal in zip(seen.data.each, seen.data.levels, signals, strict=True):
+    for record, signal in zip(seen.data.each, signals, strict=True):
         if not len(signal):  # the rest of a record in motion
             continue
         taper = np.hanning(len(signal) + 2)[1:-1]
-        power = np.abs(np.fft.rfft(signal * taper)[1:-1]) ** 2 / float(taper @ taper) / level.rms**2
+        power = np.abs(np.fft.rfft(signal * taper)[1:-1]) ** 2 / float(taper @ taper)
         frequency = np.fft.rfftfreq(len(signal), record.spacing)[1:-1]
         kept = ~np.any([(low < frequency) & (frequency < high) for low, high in without] or [frequency < 0.0], axis=0)
         bands = np.searchsorted(BANDS_HZ, frequency[kept], side="right") - 1

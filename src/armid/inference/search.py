@@ -152,8 +152,10 @@ def fit_what_counts(exploration: Exploration) -> bool:
         waiting = [(value + f.posterior, model, f) for model, value in near
                    for f in exploration.forecasts.get(model, ())
                    if model | {f.proposal.hypothesis} not in known]  # fmt: skip
-        chance, model, ahead = max(waiting, key=lambda one: one[0], default=(-np.inf, None, None))
-        if model is None or ahead is None or not top + REFITTED < chance < np.inf:
+        if not waiting:
+            break
+        chance, model, ahead = max(waiting, key=lambda one: one[0])
+        if not top + REFITTED < chance < np.inf:
             break
         about = expansion_of(exploration.fits[model], scale, exploration.library)
         for key, make in trial_of(exploration, model, about, ahead, limit_of(exploration, scale)):

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -32,7 +32,7 @@ from armid.inference.model import (
     problem_about,
     unless_diverged,
 )
-from armid.inference.moves import constants_instead, without
+from armid.inference.moves import Exploration, constants_instead, without
 from armid.inference.whitening import WhiteRecords
 from armid.loop.result import (
     CARRIES_NOT,
@@ -138,14 +138,16 @@ def close_loop(
     told("judging on the records held out")
     path = [frozenset[Hypothesis]()] if implausible else path_of(inference)
     judged = [judge(inference, hypotheses, campaign, within) for hypotheses in path]
-    steps = steps_of(inference, path, judged, campaign.taken_as_exact)
+    # the same model may be asked twice, and each answer takes some fits
+    instead = cache(partial(constants_instead, names=campaign.taken_as_exact))
+    steps = steps_of(inference, path, judged, instead)
     kept = confirmed(judged)
     unclaimed = tuple(replace(step, claimed=False) for step in steps[kept:])
     withdrawn = Withdrawn(unclaimed, judged[-1]) if unclaimed else None
     if kept < len(path) - 1:  # a model of faults alone has no step
         inference, path = inference.without(path[-1] - path[kept], path[kept]), path[: kept + 1]
         judged = rejudged(inference, path, judged, within)
-        steps = steps_of(inference, path, judged, campaign.taken_as_exact)
+        steps = steps_of(inference, path, judged, instead)
     after, before = judged[kept], judged[0]
     accused = [h for h in path[kept] if inference.posterior.probability(*h.public) >= MENTIONED]
     suspects = [*record_faults_of(accused, path[kept], inference), *broken_records(campaign.records)]
@@ -157,7 +159,7 @@ def close_loop(
         inference = inference.after_holdout(over_noise(after.train, after.holdout))
         judged = rejudged(inference, path, judged, within)
         after, before = judged[kept], judged[0]
-        steps = steps_of(inference, path, judged, campaign.taken_as_exact)
+        steps = steps_of(inference, path, judged, instead)
         steps = tuple(replace(step, claimed=False) for step in steps)
     if any(step.instead for step in steps[:kept]):
         after = doubted(after, INSTEAD)
@@ -235,11 +237,12 @@ def rejudged(
 
 
 def steps_of(
-    inference: Inference, path: Sequence[Hypotheses], judged: Sequence[Judgement], exact: Sequence[str]
-) -> tuple[Step, ...]:
+    inference: Inference, path: Sequence[Hypotheses], judged: Sequence[Judgement],
+    instead: Callable[[Exploration, Hypotheses, Hypothesis], Mapping[str, float]],
+) -> tuple[Step, ...]:  # fmt: skip
     """Return a step for each effect of the model in force; a model of faults alone has none.
 
-    exact: constants without a tolerance.
+    instead: see `constants_instead`.
     """
     steps, exploration = [], inference.exploration
     candidates, fit = exploration.library.candidates, exploration.fits[inference.in_force]
@@ -251,9 +254,9 @@ def steps_of(
         names = tuple(inference.partners(inference.in_force, hypothesis))
         settled = fit.has_arrived and not fit.is_at_a_limit(hypothesis.means)
         port = ", ".join(candidates[hypothesis.means].adds)
-        instead = constants_instead(exploration, inference.in_force, hypothesis, exact)
-        is_claimed = p >= CLAIMED and settled and not instead
-        steps.append(Step(hypothesis.name, port, names, False, is_claimed, p, after, hypothesis.form, instead))
+        constants = instead(exploration, inference.in_force, hypothesis)
+        is_claimed = p >= CLAIMED and settled and not constants
+        steps.append(Step(hypothesis.name, port, names, False, is_claimed, p, after, hypothesis.form, constants))
     return tuple(steps)
 
 

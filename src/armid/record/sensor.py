@@ -182,10 +182,9 @@ def noise_of(rest: Array, motion: Array, interval: float, times: Array | None = 
     if is_equal or np.std(rest) < HIDDEN_NOISE * step:
         apart, agrees = noise_in_motion(motion, times)
         # Of a slow motion the steps alone look like up to twice their noise; what a step hides is less than a step.
-        if is_short or (is_equal and agrees and apart > 2.0 * floor):
-            return Noise(max(apart, floor), None, 0.0, 1.0, motion.size, "differences")
-        if not is_equal:
-            return Noise(float(np.clip(apart, floor, max(step, floor))), None, 0.0, 1.0, motion.size, "differences")
+        if is_short or not is_equal or (agrees and apart > 2.0 * floor):
+            most = np.inf if is_equal else max(step, floor)
+            return Noise(float(np.clip(apart, floor, most)), None, 0.0, 1.0, motion.size, "differences")
     mean = float(np.mean(rest))
     # of equal values the mean can miss the value by its last digit, which would look like correlated noise
     deviations = rest - mean if np.ptp(rest) > 0 else np.zeros_like(rest)

@@ -221,8 +221,9 @@ def output_columns(table: CsvTable, plant: Plant) -> tuple[Plant, dict[Output, s
     for output in plant.outputs:
         alike = [h for h in table.headers if h == output.name or h.startswith(f"{output.name}_")]
         if output not in known and alike:
+            wanted, more = usual_and_rarer([*output.factors])
             warnings.warn(f"{table.file}: column {quoted(alike[0])} is not read as output '{output.name}', "
-                          f"{' or '.join(output.factors)} is expected", RecordWarning, stacklevel=2)  # fmt: skip
+                          f"{wanted}{more} is expected", RecordWarning, stacklevel=2)  # fmt: skip
     return plant, known
 
 
@@ -274,17 +275,21 @@ def input_columns(plant: Plant, named: Mapping[str, str], table: CsvTable, where
     return columns
 
 
+def usual_and_rarer(expected: Sequence[str]) -> tuple[str, str]:
+    """Return the headers that are expected, in words, and the other units of them: all would be too long to read."""
+    rarer = [max((e for e in FURTHER if name.endswith(e)), key=len)[1:] for name in expected if name.endswith(FURTHER)]
+    usual = [name for name in expected if not name.endswith(FURTHER)] or expected
+    return " or ".join(usual), f" (or in {', '.join(dict.fromkeys(rarer))})" if rarer else ""
+
+
 def missing(table: CsvTable, what: str, expected: Sequence[str]) -> ArmidError:
     def quantity_of(header: str) -> str:
         return next((q for q in KNOWN_QUANTITIES if header == q or header.startswith(f"{q}_")), header)
 
+    wanted, more = usual_and_rarer(expected)
     quantities = {quantity_of(name) for name in expected}
-    # the other units of a turn make the list too long to read
-    rarer = [max((e for e in FURTHER if name.endswith(e)), key=len)[1:] for name in expected if name.endswith(FURTHER)]
-    expected = [name for name in expected if not name.endswith(FURTHER)] or expected
     alike = [name for name in table.headers if quantity_of(name) in quantities]
-    wanted = " or ".join(expected) or "a name under [records.inputs]"
+    wanted = wanted or "a name under [records.inputs]"
     if alike:
-        more = f" (or in {', '.join(dict.fromkeys(rarer))})" if rarer else ""
         return ArmidError(f"{table.where}: column {quoted(alike[0])} is in an unknown unit, {wanted}{more} is expected")
     return ArmidError(f"{table.where}: no {what} among {quoted(list(table.headers))}, {wanted} is expected")

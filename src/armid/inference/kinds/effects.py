@@ -12,7 +12,7 @@ from armid.inference.checks import square_along, train_residuals
 from armid.inference.decisions import OUT_OF_TOLERANCE, calibration
 from armid.inference.evidence import SCALES_OF_STRENGTH, Expansion, Forecast
 from armid.inference.hypothesis import Hypothesis, Proposal
-from armid.inference.library import Library, activation_grid
+from armid.inference.library import Activation, Library, activation_grid
 from armid.inference.model import (
     ROUGHLY,
     Fit,
@@ -115,32 +115,33 @@ def waves_tried(
     that would leave least are tried. Nothing and 1 for an effect without a wave number.
     """
     space, plant = records.space, records.model.plant
-    mine = [n for n in space.free_names if key.owns(n) and records.model.parameters[n].null is None]
+    null = {n: records.model.parameters[n].null for n in space.free_names if key.owns(n)}
+    shapes, strengths = [n for n in null if null[n] is None], {n: v for n, v in null.items() if v is not None}
+    if not strengths or len(shapes) != 1 or records.model.parameters[shapes[0]].unit not in OF_WAVES:
+        return {}, 1.0
     travel = train_residuals(fit).variables.get(plant.aliases.get("theta", "theta"))
-    waves = [n for n in mine if records.model.parameters[n].unit in OF_WAVES]
-    if travel is None or len(mine) != 1 or not waves:
+    if travel is None:
         return {}, 1.0
-    low, high = (float(end[space.index(waves[0])]) for end in (space.low, space.high))
+
+    def ends(name: str) -> tuple[float, float]:
+        return ranges.get(name, (float(space.low[space.index(name)]), float(space.high[space.index(name)])))
+
+    full = {n: max(ends(n), key=lambda end: abs(end - strengths[n])) for n in strengths}
+    (waves,), (low, high) = shapes, ends(shapes[0])
     longest = max(float(np.ptp(part)) for part in fit.records.data.by_record(travel))
-    n = int(np.clip((high - low) * longest / np.pi, N_WAVES, MOST_WAVES))
-    numbers = np.linspace(low, high, n)
-    grid = activation_grid(records, key, ranges, (SLOPE,), {waves[0]: numbers})
-    alone = [a for a in grid if sum(v != a.null[p] for p, v in a.full.items() if p in a.null) == 1]
-    alone = [a for a in alone if all(v >= a.null[p] for p, v in a.full.items() if p in a.null)]
-    alone.sort(key=lambda a: a.full[waves[0]])
-    if not alone:  # no strength with an off value
-        return {}, 1.0
-    each = len(alone) // n
-    squares = []
-    for first in range(0, len(alone), WAVES_AT_ONCE * each):
-        moved = np.nan_to_num(responses(fit, records, alone[first : first + WAVES_AT_ONCE * each]))
+    n_waves = int(np.clip((high - low) * longest / np.pi, N_WAVES, MOST_WAVES))
+    numbers, squares = np.linspace(low, high, n_waves), list[float]()
+    for some in np.array_split(numbers, -(-n_waves // WAVES_AT_ONCE)):
+        grid = [Activation(strengths | {waves: float(w), n: end}, strengths, SLOPE)
+                for w in some for n, end in full.items()]  # fmt: skip
+        moved = np.nan_to_num(responses(fit, records, grid))
         squares += [square_along(beyond(fit.basis, columns.T), fit.residual)[0]
-                    for columns in moved.reshape(-1, each, moved.shape[1])]  # fmt: skip
+                    for columns in moved.reshape(len(some), len(strengths), -1)]  # fmt: skip
     # neighbours of a peak lead to it
     around = np.concatenate([[-np.inf], squares, [-np.inf]])
     peaks = np.flatnonzero((around[1:-1] >= around[:-2]) & (around[1:-1] >= around[2:]))
     tried = peaks[np.argsort(-np.asarray(squares)[peaks])[:N_WAVES]]
-    return {waves[0]: numbers[np.sort(tried)]}, n / len(tried)
+    return {waves: numbers[np.sort(tried)]}, n_waves / len(tried)
 
 
 def records_with(fit: Fit, active: tuple[EffectKey, ...], library: Library) -> WhiteRecords:
