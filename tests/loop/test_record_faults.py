@@ -122,6 +122,23 @@ def test_a_parameter_that_rises_from_record_to_record_is_told(stand, campaign):
         assert e.low < TRUTH[e.name] < e.high
 
 
+def test_a_parameter_that_is_another_in_one_record_is_told(stand, campaign):
+    options = list(COMMON)
+    options[options.index("--p0") + 1] = repr(1.03 * TRUTH["p0"])
+    other = next(r for r in read_campaign(stand(*options)).records if r.file == "short.csv")
+    records = tuple(other if r.file == other.file else r for r in campaign.records)
+    found = close_loop(Model(ARM), replace(campaign, records=records), CANDIDATES)
+    (suspect,) = report_of(found)["suspects"]
+    assert (suspect["record"], suspect["kind"], suspect["parameter"]) == ("short.csv", "parameter", "p0")
+    assert suspect["low"] < 0.03 * TRUTH["p0"] < suspect["high"]
+    assert suspect["high"] - suspect["low"] < 0.01 * TRUTH["p0"]
+    assert report_of(found)["probabilities"]["records"]["p0@short.csv"] > 0.95
+    assert (found.verdict, found.effects) == ("record_disagrees", ())
+    assert conclusion(found).startswith("short.csv: p0 is 0.09")
+    for e in found.after.estimates[:4]:
+        assert e.low < TRUTH[e.name] < e.high
+
+
 def test_broken_samples_weigh_nothing(campaign, sound, tmp_path):
     folder = tmp_path / "spoiled"
     shutil.copytree(campaign.folder, folder)

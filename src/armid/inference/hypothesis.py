@@ -14,10 +14,10 @@ from armid.model import Array
 class Hypothesis:
     """Name one thing that the declared model may lack.
 
-    kind: "effect" (an effect of the library), "record" (a fault of one record), "drift" (a parameter or constant that
-    changes from record to record) or "unknown" (a signal without a form). name: the public name. form: which published
-    form of the effect, or the variable on which an unknown signal depends. log_prior: log odds before the data.
-    means: what the kind needs to apply the hypothesis.
+    kind: "effect" (an effect of the library), "record" (a fault of one record, or a parameter or constant that is
+    another in it), "drift" (one that changes from record to record) or "unknown" (a signal without a form). name: the
+    public name. form: which published form of the effect, or the variable on which an unknown signal depends.
+    log_prior: log odds before the data. means: what the kind needs to apply the hypothesis.
     """
 
     kind: str
@@ -30,6 +30,11 @@ class Hypothesis:
     def public(self) -> tuple[str, str]:
         """Kind and name, whatever the form."""
         return self.kind, self.name
+
+    @property
+    def size_name(self) -> str:
+        """Name of the unknown that is the size of a fault or drift."""
+        return f"drift of {self.name}" if self.kind == "drift" else self.name
 
 
 # A model in words: the hypotheses that hold in it.

@@ -17,7 +17,7 @@ from armid.inference.checks import is_significant, square_along
 from armid.inference.decisions import HOPELESS, REFITTED, WINDOW
 from armid.inference.evidence import Expansion, Forecast, Scale, expansion_of, forecast, log_evidence, scale_of
 from armid.inference.hypothesis import Hypotheses, Hypothesis, Proposal, log_prior
-from armid.inference.kinds import drifts, effects
+from armid.inference.kinds import effects
 from armid.inference.library import Library
 from armid.inference.model import UNTOLD, Fit, beyond, decomposed, fit_from, start_of, unless_diverged
 from armid.inference.unknowns import Unknown, constant, freed, projected
@@ -183,7 +183,7 @@ def drops(exploration: Exploration, model: Hypotheses, again: bool = False) -> l
         key, is_effect = model - {hypothesis}, hypothesis.kind == "effect"
         is_new = key not in exploration.fits and key not in exploration.refused
         is_asked = is_new or (again and is_effect and bool(key))
-        if is_asked and (is_effect or name_of_size(hypothesis) in sizes):
+        if is_asked and (is_effect or hypothesis.size_name in sizes):
             trials.append((key, partial(without, fit, hypothesis, exploration.library, weight)))
     return trials
 
@@ -193,7 +193,7 @@ def without(fit: Fit, hypothesis: Hypothesis, library: Library, weight: float) -
     if hypothesis.kind == "effect":
         active = tuple(k for k in fit.active if k.declared != hypothesis.means)
         return near(fit, active, [fit.values], library, weight)
-    base, kept = fit.base, [f.unknown for f in fit.others if f.unknown.name != name_of_size(hypothesis)]
+    base, kept = fit.base, [f.unknown for f in fit.others if f.unknown.name != hypothesis.size_name]
     assert base is not None
     return unless_diverged(lambda: freed(fit, base, kept, weight, rough=True) if kept else
                            fit_from(base, fit.active, [fit.z], rough=True))  # fmt: skip
@@ -227,11 +227,6 @@ def constants_instead(
         if again is not None and scale.weight * (again.chi2 - fit.chi2) < 2.0 * WINDOW:
             found[product.public.removeprefix(NAMED)] = again.constants[product.names[0]]
     return found
-
-
-def name_of_size(hypothesis: Hypothesis) -> str:
-    """Return the name of the unknown that is the size of a fault or drift."""
-    return drifts.name_of(hypothesis) if hypothesis.kind == "drift" else hypothesis.name
 
 
 def near(

@@ -1,6 +1,6 @@
 """What the closed loop found, for programs: the result, its doubts, records that differ, and report.json."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar
@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from armid.estimation.advice import Advice
+from armid.estimation.constants import NAMED
 from armid.estimation.identify import JointErrors, entries_of_noise, errors_by_file, record_errors
 from armid.estimation.information import NORMAL_95
 from armid.estimation.least_squares import held_by_bound
@@ -17,7 +18,7 @@ from armid.inference.decisions import AS_WELL, CLAIMED, OVER_NOISE
 from armid.inference.evidence import expansion_of
 from armid.inference.hypothesis import Hypotheses, Hypothesis, words
 from armid.inference.infer import Inference
-from armid.inference.kinds.drifts import LARGEST_DRIFT, OfParameter
+from armid.inference.kinds.drifts import OfParameter
 from armid.inference.kinds.faults import OfRecord
 from armid.inference.kinds.missing_signal import Missing
 from armid.inference.library import Library
@@ -50,11 +51,12 @@ class RecordFault:
     """Say how one record differs.
 
     kind: "late", "clock" (fast by a share), "offset", "drift", "gain", "start", "label" (another load or key than
-    declared), "trend" (of all records: by how much the parameter is larger in this one, the last, than in the
-    first), or of samples "gap", "clipped", "stuck", "spikes". value, low, high: size with its 95 % interval
-    [unit]; from_s, to_s: where it is [s]; None where there is no such thing. action: "freed" (undone) or "left_out" (of
-    samples). output: whose sensor it is, "" where the plant has but one, and of the whole file. parameter: what has
-    the trend, then others whose trend does as well; "" for a fault of one record.
+    declared), "parameter" (by how much it is larger in this record than in the others), "trend" (of all records: by
+    how much it is larger in this one, the last, than in the first), or of samples "gap", "clipped", "stuck", "spikes".
+    value, low, high: size with its 95 % interval [unit]; from_s, to_s: where it is [s]; None where there is no such
+    thing. action: "freed" (undone) or "left_out" (of samples). output: whose sensor it is, "" where the plant has but
+    one, and of the whole file. parameter: what is another, or has the trend, then others that do as well; "" for other
+    kinds.
     """
 
     record: str
@@ -401,37 +403,44 @@ FREED, LEFT_OUT = "freed", "left_out"
 
 
 def record_faults_of(accused: Sequence[Hypothesis], model: Hypotheses, inference: Inference) -> list[RecordFault]:
-    """Return the faults of records, and the drifts, among some hypotheses of a model."""
+    """Return the faults of records, and the changes of parameters, among some hypotheses of a model."""
     fit = inference.exploration.fits[model]
-    made_by_kind: dict[str, Callable[..., RecordFault]] = {"record": fault_of, "drift": drift_of}
-    return [made_by_kind[h.kind](h.means, h.name, fit, inference) for h in sorted(accused) if h.kind in made_by_kind]
+    return [change_of(h, fit, inference) if isinstance(h.means, OfParameter) else fault_of(h, fit, inference)
+            for h in sorted(accused) if h.kind in ("record", "drift")]  # fmt: skip
 
 
-def fault_of(what: OfRecord, name: str, fit: Fit, inference: Inference) -> RecordFault:
+def fault_of(hypothesis: Hypothesis, fit: Fit, inference: Inference) -> RecordFault:
+    what: OfRecord = hypothesis.means
     record, fault, plant = fit.records.data.each[what.index], what.fault, inference.exploration.library.declared.plant
     if fault.kind == "label":
         constant = record.constants[fault.constant]
         return RecordFault(record.file, record.role, "label", FREED, 1.0 - constant, fault.unit(record, plant))
     output = record.output if fault.of_sensor and len(plant.outputs) > 1 else ""
-    size = size_of(name, what.largest, fault.unit(record, plant), fit, inference)
+    size = size_of(hypothesis, what.largest, fault.unit(record, plant), fit, inference)
     return RecordFault(record.file, record.role, fault.kind, FREED, *size, output=output)
 
 
-def drift_of(what: OfParameter, name: str, fit: Fit, inference: Inference) -> RecordFault:
-    last, factor, unit = fit.records.data.records[-1], LARGEST_DRIFT, "1"
+def change_of(hypothesis: Hypothesis, fit: Fit, inference: Inference) -> RecordFault:
+    what: OfParameter = hypothesis.means
+    factor, unit, kind = what.reach(fit), "1", "parameter" if what.file else "trend"
     if what.product is None:
         place = list(fit.values).index(what.name)
         factor, unit = factor * float(fit.records.span[place]), fit.model.parameters[what.name].unit
-    others = [n for n, p in inference.posterior.of_kind("drift").items() if n != name and p >= AS_WELL]
-    size = size_of(f"drift of {name}", factor, unit, fit, inference)
-    return RecordFault(last.file, last.role, "trend", FREED, *size, parameter=", ".join([name, *others]))
+    record = next((r for r in fit.records.data.records if r.file == what.file), fit.records.data.records[-1])
+    likely = inference.posterior.of_kind(hypothesis.kind)
+    mine = {h.name: h.means for h in inference.exploration.drifts if h.kind == hypothesis.kind}
+    others = [mine[n].name for n, p in likely.items()
+              if n in mine and mine[n].file == what.file and n != hypothesis.name and p >= AS_WELL]  # fmt: skip
+    size = size_of(hypothesis, factor, unit, fit, inference)
+    names = ", ".join(name.removeprefix(NAMED) for name in (what.name, *others))
+    return RecordFault(record.file, record.role, kind, FREED, *size, parameter=names)
 
 
 def size_of(
-    name: str, factor: float, unit: str, fit: Fit, inference: Inference
+    hypothesis: Hypothesis, factor: float, unit: str, fit: Fit, inference: Inference
 ) -> tuple[float, str, float, float]:  # fmt: skip
-    """Return a further unknown of a fit: value, unit and 95 % interval; factor: the unit per prior deviation."""
-    place = next(i for i, f in enumerate(fit.others) if f.unknown.name == name)
+    """Return the size of a fault or change: value, unit and 95 % interval; factor: the unit per prior deviation."""
+    place = next(i for i, f in enumerate(fit.others) if f.unknown.name == hypothesis.size_name)
     covariance = expansion_of(fit, inference.exploration.scale(), inference.exploration.library).covariance
     at = fit.n_free + place
     value, half = fit.others[place].value, NORMAL_95 * float(np.sqrt(covariance[at, at]))
@@ -460,12 +469,15 @@ def fault_sentence(s: RecordFault) -> str:
         return f"{s.record}: {s.value:.0f} samples are {words}, {where}: they count as no data."
     if s.kind == "label" or s.value is None or s.low is None or s.high is None:
         return f"{s.record} looks like a record of another load, or of other inputs than it tells."
-    if s.kind == "trend":
+    if s.parameter:
         grew, (low, high) = ("larger" if s.value > 0.0 else "smaller"), along(s.value, s.low, s.high)
+        factor, unit = (100.0, "%") if s.unit == "1" else (factor, unit)
         size = sized(factor * abs(s.value), factor * low, factor * high, unit)
-        names = " or ".join(s.parameter.split(", "))
-        return (f"{names} is {size} {grew} in {s.record}, the last record, than in the first, and changes from each to "
-                "the next, as in a machine that warms up, wears or runs in; corrected.")  # fmt: skip
+        changed = f"{' or '.join(s.parameter.split(', '))} is {size} {grew}"
+        if s.kind == "parameter":
+            return f"{s.record}: {changed} in it than in the other records; corrected."
+        return (f"{changed} in {s.record}, the last record, than in the first, and changes from each to the next, as "
+                "in a machine that warms up, wears or runs in; corrected.")  # fmt: skip
     if s.kind == "late":
         word = "late" if s.value > 0.0 else "early"
         low, high = along(s.value, 1e3 * s.low, 1e3 * s.high)

@@ -1,11 +1,11 @@
-"""Drifts: a parameter or a constant that changes in proportion to the order of the records."""
+"""A parameter or a constant that changes: with the order of the records (a drift), or in one record alone."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from armid.estimation.constants import Product
+from armid.estimation.constants import NAMED, Product
 from armid.inference.decisions import calibration
 from armid.inference.evidence import Expansion, Forecast
 from armid.inference.hypothesis import Hypothesis, Proposal
@@ -16,9 +16,11 @@ from armid.inference.unknowns import Unknown, freed
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array
 
-# Fewest record files for a drift to be considered: with fewer a drift is a fault of one record.
-FEWEST_RECORDS = 4
-# Its largest plausible size, as a share of the range or of the constant; prior deviations as shares of that.
+# Fewest record files for a drift to be considered: with fewer a drift is a change in one record. Of two records nobody
+# can tell which of them is the other one.
+FEWEST_RECORDS, FEWEST_OTHERS = 4, 2
+# Its largest plausible size, as a share of the constant, of a parameter that keeps its sign, or of the range of one
+# that does not; prior deviations as shares of that.
 LARGEST_DRIFT, SCALES_OF_DRIFT = 0.5, np.array([0.01, 0.03, 0.1, 0.3, 1.0])
 # Smallest size about which its effect is taken: of smaller ones rounding would speak.
 LEAST_SIZE = 0.01
@@ -26,18 +28,37 @@ LEAST_SIZE = 0.01
 
 @dataclass(frozen=True)
 class OfParameter:
-    """Say which parameter of the declared model, or which constant, drifts."""
+    """Say which parameter of the declared model, or which constant, changes; file: of the one record, "" of a drift."""
 
     name: str
     product: Product | None = None
+    file: str = ""
+
+    def reach(self, fit: Fit) -> float:
+        """Return the largest plausible change of a parameter, as a share of its range; of a constant, of its value."""
+        if self.product is not None:
+            return LARGEST_DRIFT
+        space, place = fit.records.space, list(fit.values).index(self.name)
+        low, high = float(space.low[space.free][place]), float(space.high[space.free][place])
+        keeps_sign = low >= 0.0 or high <= 0.0
+        return LARGEST_DRIFT * (abs(fit.values[self.name]) / (high - low) if keeps_sign else 1.0)
+
+    def weights(self, records: WhiteRecords) -> Array:
+        """Return how much of the change each record file has, (n_files,)."""
+        files = [record.file for record in records.data.records]
+        if self.file:
+            return np.array([float(file == self.file) for file in files])
+        return np.arange(len(files)) / (len(files) - 1.0) - 0.5
 
     def undone(self, fit: Fit, size: float) -> "Undone":
-        """Return what takes the drift out of records, taken about a fit and a size of it."""
+        """Return what takes the change out of records, taken about a fit and a size of it."""
         records = fit.base or fit.records
         firsts, changes = [i for i, replay in enumerate(records.replays) if replay.index == 0], []
         at, names = records.shares(free_values(records, fit.values)), records.space.free_names
-        for place, index in enumerate(firsts):
-            share = size * LARGEST_DRIFT * (place / (len(firsts) - 1.0) - 0.5) * np.array([0.0, 0.5, 1.0])
+        for weight, index in zip(self.weights(records), firsts, strict=True):
+            if weight == 0.0:
+                continue
+            share = size * self.reach(fit) * weight * np.array([0.0, 0.5, 1.0])
             Z, shares = np.tile(at, (3, 1)), {name: np.full(3, off) for name, off in fit.constants.items()}
             if self.product is not None:
                 name = self.product.names[0]
@@ -50,7 +71,7 @@ class OfParameter:
 
 @dataclass(frozen=True, eq=False)
 class Undone:
-    """Return records as they would be in the middle of the campaign: a parabola through no drift, a half and a whole.
+    """Return records as they would be without a change: a parabola through none, a half and a whole.
 
     size: of the whole. changes: of each file its index, and of each of its signals what a half and the whole change,
     (2, n_samples).
@@ -68,26 +89,29 @@ class Undone:
 
 
 def hypotheses(fit: Fit, library: Library) -> list[Hypothesis]:
-    """Return the drifts of parameters and constants, none where there are few records."""
-    if len(fit.records.data.records) < FEWEST_RECORDS:
-        return []
+    """Return the changes of parameters and constants, those that there are records enough to tell."""
+    files = [record.file for record in fit.records.data.records]
     own = [OfParameter(name) for name in fit.values if library.owner(name) is None]
     own += [OfParameter(p.public, p) for p in fit.products(library.tolerances)]
-    return [Hypothesis("drift", one.name, "", calibration().log_odds("drift", len(own)), one) for one in own]
+    drifts = own if len(files) >= FEWEST_RECORDS else []
+    others = [replace(one, file=file) for one in own for file in files] if len(files) > FEWEST_OTHERS else []
+    return [
+        *(Hypothesis("drift", d.name, "", calibration().log_odds("drift", len(drifts)), d) for d in drifts),
+        *(Hypothesis("record", f"{one.name.removeprefix(NAMED)}@{one.file}", "",
+                     calibration().log_odds("drift", len(others)), one) for one in others),
+    ]  # fmt: skip
 
 
 def propose(fit: Fit, known: list[Hypothesis]) -> list[Proposal]:
-    """Return the drifts that a fit does not hold, with what the largest plausible one does."""
-    if not known:
-        return []
-    held = {f.unknown.name for f in fit.others}
-    order, names, proposals = order_of(fit.records), list(fit.values), []
+    """Return the changes that a fit does not hold, with what the largest plausible one does."""
+    held, names, proposals = {f.unknown.name for f in fit.others}, list(fit.values), []
+    n_samples = [sum(one.n_samples for one in r.each) for r in fit.records.data.records]
     for hypothesis in known:
         what: OfParameter = hypothesis.means
-        if name_of(hypothesis) in held or (what.product is None and what.name not in names):
+        if hypothesis.size_name in held or (what.product is None and what.name not in names):
             continue
         slope = what.product.slope if what.product is not None else fit.jacobian[:, names.index(what.name)]
-        column = LARGEST_DRIFT * slope * order
+        column = what.reach(fit) * slope * np.repeat(what.weights(fit.records), n_samples)
         if column.any():
             proposals.append(
                 Proposal(hypothesis, column[np.newaxis], SCALES_OF_DRIFT, np.zeros(1), partial(refit, hypothesis))
@@ -96,25 +120,14 @@ def propose(fit: Fit, known: list[Hypothesis]) -> list[Proposal]:
 
 
 def refit(hypothesis: Hypothesis, fit: Fit, about: Expansion, ahead: Forecast, limit: float) -> Fit | None:
-    """Return the model with a drift, fitted about its own estimate twice: what a drift does is taken there."""
+    """Return the model with a change, fitted about its own estimate twice: what it does is taken there."""
     base, again, weight, size = fit.base or fit.records, fit, about.scale.weight, ahead.best(1)[0][1]
-    others = [f.unknown for f in fit.others if f.unknown.name != name_of(hypothesis)]
+    others = [f.unknown for f in fit.others if f.unknown.name != hypothesis.size_name]
     for is_first in (True, False, False):
         size = float(np.copysign(np.clip(abs(size), LEAST_SIZE, 1.0), size))
-        unknown = Unknown(name_of(hypothesis), hypothesis.means.undone(again, size))
+        unknown = Unknown(hypothesis.size_name, hypothesis.means.undone(again, size))
         tried = unless_diverged(lambda: freed(again, base, [*others, unknown], weight, limit, is_first))  # noqa: B023
         if tried is None:
             return None
         again, size = tried, tried.others[-1].value
     return again
-
-
-def name_of(hypothesis: Hypothesis) -> str:
-    """Return the name of the unknown that is the size of a drift."""
-    return f"drift of {hypothesis.name}"
-
-
-def order_of(records: WhiteRecords) -> Array:
-    """Return the place of the file of each sample in the order of the campaign, from -1/2 to 1/2, (n_samples,)."""
-    n_samples = [sum(one.n_samples for one in r.each) for r in records.data.records]
-    return np.repeat(np.arange(len(n_samples)) / (len(n_samples) - 1.0) - 0.5, n_samples)
