@@ -1,7 +1,8 @@
 """Fit temperature and priors by kind to closed campaigns, and print `calibration.toml`.
 
-    python studies/calibration/fit.py FOLDER
+    python studies/calibration/fit.py FOLDER [--judge FOLDER ...]
 
+--judge: runs of other seeds, whose score with the fitted numbers tells whether these are more than chance.
 The models of each mixture are weighted anew by log evidence / temperature + log prior odds. What is minimised is the
 mean log score of all statements: each effect, each faulty record, something unknown (Good 1952).
 """
@@ -32,10 +33,9 @@ LARGE = np.log(3.0)
 def main(words: Sequence[str]) -> int:
     parser = argparse.ArgumentParser(prog="fit.py", description="Fit temperature and priors by kind.")
     parser.add_argument("folder", type=Path)
-    folder = parser.parse_args(words).folder
-    plan, closed, _ = read(folder)
-    # Two kinds of machine judge the fit and take no part in it.
-    every = [Mixture(one) for one in closed if one.group != "left out"]
+    parser.add_argument("--judge", type=Path, nargs="+", default=[])
+    given = parser.parse_args(words)
+    plan, every = mixtures(given.folder)
     first = np.zeros(1 + len(KINDS))
     found = minimize(lambda x: loss(every, x), first, method="Nelder-Mead", options={"xatol": 1e-2, "fatol": 1e-5})
     # Priors alone, for a temperature that says nothing.
@@ -47,7 +47,19 @@ def main(words: Sequence[str]) -> int:
     for kind, more, alone in zip(KINDS, found.x[1:], plain.x, strict=True):
         was = before.expected[kind]
         print(f"{kind} = {was * np.exp(more):.2g}  # with temperature 1: {was * np.exp(alone):.2g}")
+    for folder in given.judge:
+        plan, others = mixtures(folder)
+        gains = [one.loss(first) - one.loss(found.x) for one in others]
+        error = np.std(gains, ddof=1) / np.sqrt(len(gains))
+        print(f"# Seed {plan['seed']}, {len(others)} campaigns: with the fitted numbers the mean log score falls by "
+              f"{np.mean(gains):.3f} (standard error {error:.3f}).")  # fmt: skip
     return 0
+
+
+def mixtures(folder: Path) -> tuple[Any, list["Mixture"]]:
+    """Return the plan of a run and its campaigns; two kinds of machine judge a fit and take no part in it."""
+    plan, closed, _ = read(folder)
+    return plan, [Mixture(one) for one in closed if one.group != "left out"]
 
 
 class Mixture:
