@@ -37,6 +37,7 @@ from armid.problem.problem import (
 )
 from armid.problem.similarity import similarity
 from armid.problem.space import Space
+from armid.problem.starts import with_starts
 from armid.record import Campaign
 from armid.report.document import inputs_act
 from armid.report.result import IDENTIFICATION, Kind, Result
@@ -296,6 +297,7 @@ def identified(
         signals, measured = signals_of(seen, space.complete(x[np.newaxis])), [r.measured for r in seen]
         value = float(fitness_of(fitness, seen, measured, signals, weights_of(fitness, seen), output_sizes(seen))[0])
     candidate = space.complete(x[np.newaxis])[0]
+    holdout = with_starts(holdout, candidate)
     information, scatter = judged(fitness, seen, space, x, seed, progress, interval and stopped != WAS_INTERRUPTED)
     trace = meter.trace()
     return Identification(

@@ -21,6 +21,7 @@ from armid.inference.model import Fit, beyond, decomposed
 from armid.inference.whitening import WhitenedData, WhiteRecords, whitened, with_answers
 from armid.model import Array, Model
 from armid.problem.problem import Replay, with_each
+from armid.problem.starts import with_starts
 from armid.record import Record
 from armid.record.sensor import memory_of
 
@@ -252,7 +253,7 @@ def holdout_residuals(fit: Fit, records: tuple[Record, ...], library: Library) -
     plant, tolerances = library.declared.plant, library.tolerances
     records = tuple(moved_record(r, plant, fit.constants) for r in records)
     data = whitened(records, plant, library.data if library.as_read is None else library.as_read)
-    ready = calibrated_replays(records, fit.model, fit.records.space, fit.values)
+    ready = with_starts(calibrated_replays(records, fit.model, fit.records.space, fit.values), fit.candidate)
     if library.as_read is not None:
         noise = pooled_noise(library.as_read.records)
         data = with_answers(data, ready, fit.candidate, noise)

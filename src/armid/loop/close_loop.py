@@ -54,6 +54,7 @@ from armid.loop.result import (
     record_faults_of,
 )
 from armid.model import Array, Effect, Model
+from armid.problem.starts import with_starts
 from armid.record import Campaign, Record
 from armid.units import behind
 
@@ -312,7 +313,7 @@ def errors_on(records: tuple[Record, ...], judged: Judgement, library: Library) 
     """Return the errors of a model on records as they were read."""
     fit = judged.fit
     moved = [moved_record(r, library.declared.plant, fit.constants) for r in records]
-    replays = calibrated_replays(moved, fit.model, fit.records.space, fit.values)
+    replays = with_starts(calibrated_replays(moved, fit.model, fit.records.space, fit.values), fit.candidate)
     return campaign_errors(replays, fit.candidate) if replays else None
 
 

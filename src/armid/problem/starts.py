@@ -1,5 +1,7 @@
 """Starts of records in motion, fitted with the parameters: nuisances of each piece that cost a search no dimension.
 
+What the reader saw of a start is what the outputs showed. A sensor that a model holds to be off shows another state.
+
 Near one start the signals are almost linear in its constants. The best start of each candidate is then a projection
 (`StartCorrection`), and a fit sees only what no start explains. `with_starts` finds the start of one candidate about
 which this holds.
@@ -20,6 +22,7 @@ from armid.problem.space import Space
 from armid.record import Piece
 from armid.record.record import Samples, StartCorrection
 from armid.record.sensor import correlation_sum
+from armid.record.start import outputs_at, with_outputs_moved
 
 # Step of the differences, as a share of the plant's speed scale; a speed held for a second is the size of a position.
 MOVE = 1e-4
@@ -35,7 +38,8 @@ LEAST_NOISE = 1e-6
 def with_starts(replays: Sequence[Replay], candidate: Array) -> tuple[Replay, ...]:
     """Return replays whose pieces start where one whole candidate fits best, ready to correct others about there.
 
-    Pieces whose start is not to be fitted stay as they are. Gauss-Newton steps from the piece's own start minimise
+    Pieces whose start was measured and is not to be fitted (of a record that is held out) start where the candidate's
+    outputs show what the reader saw. Gauss-Newton steps from the piece's own start minimise
 
     J(s) = |x - y(s)|^2 / (max(1, m) c) + |(s - s_reader) / 3 deviations|^2
 
@@ -44,7 +48,8 @@ def with_starts(replays: Sequence[Replay], candidate: Array) -> tuple[Replay, ..
     """
 
     def started(ready: ReadyRecord) -> ReadyRecord:
-        pieces = tuple(Start(ready, k).fitted(candidate) for k in range(len(ready.record.pieces)))
+        starts = [Start(ready, k) for k in range(len(ready.record.pieces))]
+        pieces = tuple((one.fitted if one.piece.shown_start else one.read)(candidate) for one in starts)
         return replace(ready, record=replace(ready.record, pieces=pieces))
 
     return with_each(replays, started)
@@ -98,10 +103,14 @@ def fits_starts(replays: Sequence[Replay]) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Start:
-    """Fit the start of one piece of a record, to all its signals; index: which piece."""
+    """Fit the start of one piece of a record, to all its signals; index: which piece.
+
+    off: by how much the reader saw other start constants than the candidate's outputs would show, SI, (n_constants,).
+    """
 
     ready: ReadyRecord
     index: int
+    off: Array | float = 0.0
 
     @property
     def piece(self) -> Piece:
@@ -109,7 +118,7 @@ class Start:
 
     @property
     def names(self) -> list[str]:
-        return list(self.piece.shown_start)
+        return list(self.piece.start_deviation)
 
     @property
     def constants(self) -> Array:
@@ -162,7 +171,7 @@ class Start:
     @cached_property
     def shown(self) -> tuple[Array, Array]:
         """The start that the reader saw, and how far from it the fit may go, SI, both (n_constants,)."""
-        return np.array(list(self.piece.shown_start.values())), reach_of_start(self.piece)
+        return np.array(list(self.piece.shown_start.values())) - self.off, reach_of_start(self.piece)
 
     def beyond(self, residual: Array, slopes: Array) -> Array:
         """Return what no start can do of a residual, (n_seen,), infinite where the simulation diverges."""
@@ -190,10 +199,34 @@ class Start:
 
     def fitted(self, candidate: Array) -> Piece:
         """Return the piece from the best start of a candidate, as it is where the candidate diverges."""
-        piece, constants, population = self.piece, self.constants, candidate[np.newaxis]
-        if not self.names:
-            return piece
+        constants, population = self.constants, candidate[np.newaxis]
         signals, slopes = self.linear(constants, population)
+        return replace(self, off=self.off_by(signals[:, 0, 0])).fitted_from(constants, signals, slopes, population)
+
+    def read(self, candidate: Array) -> Piece:
+        """Return the piece from where the outputs of a candidate are as the reader saw them."""
+        if not self.names:
+            return self.piece
+        (first,) = self.signals(self.constants[np.newaxis], candidate[np.newaxis])[:, :, 0].T
+        start = dict(zip(self.names, map(float, self.constants - self.off_by(first)), strict=True))
+        return self.piece.with_constants(start)
+
+    def off_by(self, first: Array) -> Array:
+        """Return by how much start constants are off; first: outputs of a model that starts from them, (n_outputs,).
+
+        The plant's own outputs are functions of its states: what a model shows besides is what its sensors are off by.
+        """
+        plant, known = self.ready.model.plant, self.piece.manoeuvre.constants
+        start = dict(zip(self.names, map(float, self.constants), strict=True))
+        own = outputs_at(plant, start, known)
+        shown = {plant.outputs[place].name: float(y) for place, y in zip(self.places, first, strict=True)}
+        beside = {name: y - own[name] for name, y in shown.items() if name in own}
+        moved = with_outputs_moved(plant, start, known, beside)
+        return np.array([moved[name] - start[name] for name in self.names])
+
+    def fitted_from(self, constants: Array, signals: Array, slopes: Array, population: Array) -> Piece:
+        """Return the piece from the best start; signals, slopes: about some start, see `linear`."""
+        piece = self.piece
         for _ in range(MOST_OF_START):
             residual, seen = self.residual(signals)[0], self.seen_slopes(slopes)[:, 0]
             if not (np.isfinite(residual).all() and np.isfinite(seen).all()):

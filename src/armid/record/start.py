@@ -92,6 +92,33 @@ def state_shown(
     return dict(zip(names, map(float, start), strict=True)), dict(zip(names, map(float, deviations), strict=True))
 
 
+def outputs_at(plant: Plant, start: Mapping[str, float], constants: Mapping[str, float]) -> dict[str, float]:
+    """Return the outputs that start constants decide, at the first sample; constants: of the manoeuvre."""
+    visible = VisibleOutputs(plant, {n: v for n, v in constants.items() if n not in start})
+    states = visible.states(start)
+    return {o.name: visible.value(o.signal, states) for o in plant.outputs if visible.shows(o.signal)}
+
+
+def with_outputs_moved(
+    plant: Plant, start: Mapping[str, float], constants: Mapping[str, float], changes: Mapping[str, float]
+) -> dict[str, float]:  # fmt: skip
+    """Return start constants at which outputs are so much larger, by least squares; changes: output -> its unit."""
+    names, step = list(start), TINY * plant.scales.speed
+    seen = [name for name in outputs_at(plant, start, constants) if name in changes]
+    move = np.array([changes[name] for name in seen])
+    if not (move.any() and np.isfinite(move).all()):
+        return dict(start)
+
+    def at(values: Array) -> Array:
+        known = outputs_at(plant, dict(zip(names, map(float, values), strict=True)), constants)
+        return np.array([known[name] for name in seen])
+
+    here = np.array([start[name] for name in names])
+    slopes = np.array([at(here + step * one) - at(here - step * one) for one in np.eye(len(names))]).T / (2.0 * step)
+    moved = here + np.linalg.lstsq(slopes, move, rcond=1e-12)[0]
+    return dict(zip(names, map(float, moved), strict=True))
+
+
 def n_still(inputs: Sequence[Array]) -> int:
     """Return during how many first samples no input changes, or changes by no more than its noise."""
     if not inputs:

@@ -22,6 +22,7 @@ from armid.model import Array, Model, Plant
 from armid.problem.problem import ReadyRecord, Replay, signals_of, with_each
 from armid.problem.starts import with_shown_starts
 from armid.record import Piece, Record
+from armid.record.start import outputs_at, with_outputs_moved
 
 # Faults whose size is fitted: largest plausible one, in seconds, in shares of the largest signal (a drift per second),
 # as a share, in radians or metres.
@@ -69,7 +70,7 @@ class Fault:
         """Return a record without the fault; output: whose sensor it is, "" for the first."""
         own = output or record.output
         measured = {one.output: self.measured(one, value) for one in record.each if self.touches(own, one.output)}
-        undone = record.with_measured(measured).with_pieces(lambda piece: self.undone_piece(piece, value, plant))
+        undone = record.with_measured(measured).with_pieces(lambda piece: self.undone_piece(piece, value, plant, own))
         first, last = self.lost(record, value)
         if not first + last:
             return undone
@@ -104,11 +105,21 @@ class Fault:
         own = np.arange(record.measured.size, dtype=np.float64)
         return own + value / record.manoeuvre.interval if self.kind == "late" else own * (1.0 + value)
 
-    def undone_piece(self, piece: Piece, value: float, plant: Plant) -> Piece:
+    def undone_piece(self, piece: Piece, value: float, plant: Plant, output: str) -> Piece:
+        if self.kind in ("offset", "gain"):
+            return self.with_sound_start(piece, value, plant, output) if piece.shown_start else piece
         if not self.constant:
             return piece
         given = {c.name: c.value for c in plant.constants} | dict(piece.manoeuvre.constants)
         return piece.with_constants({self.constant: value if self.kind == "label" else given[self.constant] + value})
+
+    def with_sound_start(self, piece: Piece, value: float, plant: Plant, output: str) -> Piece:
+        """Return a piece whose start is what the sensor would have shown without its offset or gain."""
+        shown, known = piece.shown_start, piece.manoeuvre.constants
+        name = output or plant.outputs[0].name
+        read = outputs_at(plant, shown, known).get(name, 0.0)
+        change = -value if self.kind == "offset" else read / (1.0 + value) - read
+        return replace(piece, shown_start=with_outputs_moved(plant, shown, known, {name: change}))
 
     def measured(self, record: Record, value: float) -> Array:
         """Return what was measured without the fault, (n_samples,)."""
