@@ -21,8 +21,8 @@ NUMERICS = {
     "estimate of the noise": ("FEWEST_FOR_COLOUR", "FEWEST_ORDINATES", "MOST_LAGS_OF_NOISE", "LINE_OF_MAINS",
                               "MOST_BRIDGED", "STILL", "EVEN_SPEED", "MISFIT", "ENGINE_ERRORS", "CHANCE_OF_COLOUR",
                               "CERTAIN", "TRIFLE"),
-    "what can be asked of records at all": ("FEWEST_RECORDS", "FEWEST_OTHERS", "MOVED", "SAME_PORT", "SAME_VARIABLE", "SAME_ORDER",
-                                        "SAME_LAW", "OF_WAVES"),
+    "what can be asked of records at all": ("FEWEST_RECORDS", "FEWEST_OTHERS", "MOVED", "SAME_PORT", "SAME_VARIABLE",
+                                        "SAME_ORDER", "SAME_LAW", "OF_WAVES"),
     "layout of pages": ("MOST_DRAWN", "MOST_CONSTANTS", "SHIFTED", "LEAST_SHARE", "WEAK", "REPORT_VERSION"),
 }  # fmt: skip
 # Plain numbers in comparisons that are no decision either: a half, rounding, and where a series or a range turns.
