@@ -28,6 +28,9 @@ OVER_NOISE = 1.1
 SIGNIFICANCE = 0.005
 # Probability that a declared tolerance is wrong: as often a normal constant is off by more than two deviations.
 OUT_OF_TOLERANCE = 0.05
+# Periods of an effect that repeats with position that the travel must hold: fewer fit anything that bends. Half a
+# period of cogging stood for a spring that hardens, with a probability of 1.00.
+PERIODS = 5
 # Change of a record over its noise (rms) from which it is faulty: below it undoing a fault gains by smoothing alone.
 MOVES = 0.7
 # Log posterior odds within which models are expanded, and count as rivals for the next record (Madigan, Raftery 1994).

@@ -23,6 +23,7 @@ from armid.inference.checks import is_significant, train_residuals
 from armid.inference.decisions import LISTED, calibration
 from armid.inference.evidence import expansion_of
 from armid.inference.hypothesis import Hypotheses, Hypothesis
+from armid.inference.kinds.effects import least_waves
 from armid.inference.kinds.same_law import doubles
 from armid.inference.library import Library, library_of
 from armid.inference.model import ROUGHLY, Fit, accurate, fit_from, start_of
@@ -293,7 +294,8 @@ def prepared(
     problem = library.problem(())
     library = library.about(with_fitted_starts(problem.replays, problem.space))
     library, declared = with_input_noise(*with_noise(*with_scales(library)))
-    return replace(library, doubles=doubles(declared, library)), declared
+    library = replace(library, doubles=doubles(declared, library), least_waves=least_waves(declared), _problems={})
+    return library, declared
 
 
 def infer(library: Library, declared: Fit) -> Inference:
@@ -322,7 +324,7 @@ def infer(library: Library, declared: Fit) -> Inference:
     if is_exact or not pooled_noise(library.data.records):
         return inference
     fit = inference.exploration.fits[inference.in_force]
-    if fit.active and inference.posterior.unknown_is_likely:
+    if inference.in_force and inference.posterior.unknown_is_likely:
         # the declared model may answer to its inputs quite otherwise
         answering = with_measured_inputs(as_exact(library), fit)
         if may_be_all(answering, fit):

@@ -40,6 +40,8 @@ from armid.problem.space import Space, space_of
 from armid.problem.starts import fits_starts
 from armid.record import Override, Record
 
+# Units of a wave number.
+OF_WAVES = ("1/rad", "1/m")
 # How many standard deviations a constant may be off; its sign stays.
 FARTHEST, LEAST_ERROR = 3.0, -0.95
 S = TypeVar("S")
@@ -57,7 +59,8 @@ class Library:
     as_read: the data whose inputs count as exact, where in `data` they count as measured with noise, else None.
     reach: by which factor strengths that scale with the machine may exceed their declared range. widened: ranges of
     strengths of the declared model that were too narrow. doubles: effects that are the law of a free parameter of the
-    declared model, or of a constant within its tolerance.
+    declared model, or of a constant within its tolerance. least_waves: smallest wave number of a candidate that repeats
+    with position.
     """
 
     declared: Model
@@ -77,13 +80,24 @@ class Library:
     reach: float = 1.0
     widened: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     doubles: Mapping[EffectKey, Double] = field(default_factory=dict)
+    least_waves: float = 0.0
     _models: dict[Active, Model] = field(default_factory=dict)
     _problems: dict[frozenset[EffectKey], WhiteRecords] = field(default_factory=dict)
     _schedules: dict[EffectKey, "Schedules"] = field(default_factory=dict)
 
     def joinable(self, active: Active) -> list[EffectKey]:
         there = {other.public for other in active}
-        return [k for k in self.candidates if k.public not in there and k not in self.left_out]
+        return [k for k in self.candidates if k.public not in there and k not in self.left_out and self.may_repeat(k)]
+
+    def may_repeat(self, key: EffectKey) -> bool:
+        """Tell whether the largest wave number of an effect has periods enough in the travel."""
+        parameters = self.compiled_model((key.declared,)).parameters
+        return all(parameters[name].high > self.least_waves for name in self.waves_of(key, parameters))
+
+    def waves_of(self, key: EffectKey, parameters: Mapping[str, Parameter]) -> list[str]:
+        """Return the wave numbers of an effect that repeats with position, whose range the user did not give."""
+        given = {*self.bounds, *self.fixed, *self.overrides}
+        return [n for n, p in parameters.items() if key.owns(n) and p.unit in OF_WAVES and n not in given]
 
     @cached_property
     def left_out(self) -> dict[EffectKey, str]:
@@ -218,6 +232,10 @@ class Library:
                 space = space.with_bounds(name, parameter.low, parameter.high)
             elif self.reach > 1.0 and mine is not None and name in space.free_names and name in self.scaled_strengths:
                 space = space.with_bounds(name, *self.box_of(name, parameter))
+        for name in (name for key in active for name in self.waves_of(key, model.parameters)):
+            low, high = model.parameters[name].low, model.parameters[name].high
+            if low < self.least_waves < high:
+                space = space.with_bounds(name, self.least_waves, high)
         return space
 
     def box_of(self, name: str, parameter: Parameter) -> tuple[float, float]:

@@ -9,10 +9,10 @@ import numpy as np
 from armid.estimation.least_squares import descend
 from armid.inference.candidates import EffectKey
 from armid.inference.checks import square_along, train_residuals
-from armid.inference.decisions import OUT_OF_TOLERANCE, calibration
+from armid.inference.decisions import OUT_OF_TOLERANCE, PERIODS, calibration
 from armid.inference.evidence import SCALES_OF_STRENGTH, Expansion, Forecast
 from armid.inference.hypothesis import Hypothesis, Proposal
-from armid.inference.library import Activation, Library, activation_grid
+from armid.inference.library import OF_WAVES, Activation, Library, activation_grid
 from armid.inference.model import (
     ROUGHLY,
     Fit,
@@ -35,8 +35,8 @@ SHARES_TRIED = (SLOPE, 0.05, 0.4)
 N_STARTS_OF_EFFECT = 4
 # First steps of a fit, after which it shows how far it may lead.
 N_FIRST_STEPS = 2
-# Units of a wave number; how many of them are looked at, simulated at once, and tried.
-OF_WAVES, MOST_WAVES, WAVES_AT_ONCE, N_WAVES = ("1/rad", "1/m"), 256, 64, 8
+# Wave numbers that are looked at, simulated at once, and tried.
+MOST_WAVES, WAVES_AT_ONCE, N_WAVES = 256, 64, 8
 
 
 def hypotheses(library: Library) -> dict[EffectKey, Hypothesis]:
@@ -106,6 +106,17 @@ def proposal(fit: Fit, hypothesis: Hypothesis, key: EffectKey, library: Library)
     )
 
 
+def positions(fit: Fit) -> Array | None:
+    """Return the position at each sample, as a fit simulates it, (n_samples,); None where the plant has none."""
+    return train_residuals(fit).variables.get(fit.model.plant.aliases.get("theta", "theta"))
+
+
+def least_waves(fit: Fit) -> float:
+    """Return the smallest wave number that has periods enough in the travel of a fit, 0 where there is no position."""
+    travel = positions(fit)
+    return 0.0 if travel is None else 2.0 * np.pi * PERIODS / max(float(np.ptp(travel)), 1e-300)
+
+
 def waves_tried(
     fit: Fit, records: WhiteRecords, key: EffectKey, ranges: Mapping[str, tuple[float, float]]
 ) -> tuple[dict[str, Array], float]:
@@ -114,12 +125,12 @@ def waves_tried(
     Records of a travel L tell wave numbers apart that differ by pi/L. All of them are looked at to first order; those
     that would leave least are tried. Nothing and 1 for an effect without a wave number.
     """
-    space, plant = records.space, records.model.plant
+    space = records.space
     null = {n: records.model.parameters[n].null for n in space.free_names if key.owns(n)}
     shapes, strengths = [n for n in null if null[n] is None], {n: v for n, v in null.items() if v is not None}
     if not strengths or len(shapes) != 1 or records.model.parameters[shapes[0]].unit not in OF_WAVES:
         return {}, 1.0
-    travel = train_residuals(fit).variables.get(plant.aliases.get("theta", "theta"))
+    travel = positions(fit)
     if travel is None:
         return {}, 1.0
 
