@@ -36,7 +36,7 @@ from armid.model import EFFECTS, Array, Effect, Model
 from armid.model.effects.sensor import sensor_effects
 from armid.problem.space import Space
 from armid.record import Campaign
-from armid.report.document import may_be_inputs
+from armid.report.document import NO_MORE
 
 # By which factor strengths that scale with the machine may exceed their declared range.
 REACH_OF_STRENGTHS = 16.0
@@ -359,8 +359,9 @@ def with_exact_inputs(library: Library, inference: Inference) -> Library:
 
 
 def may_be_all(library: Library, fit: Fit) -> bool:
-    """Tell whether noise of the inputs may be all of what a model leaves of a signal."""
-    return any(may_be_inputs(level.rms, level.moved, left) for level, left in moved_and_left(library, fit))
+    """Tell whether noise of the inputs may be all of what a model leaves of a signal beyond the noise of its sensor."""
+    return any(level.moved > TRIFLE * left and left < NO_MORE * float(np.hypot(level.rms, level.moved))
+               for level, left in moved_and_left(library, fit))  # fmt: skip
 
 
 def matters(library: Library, fit: Fit) -> bool:
