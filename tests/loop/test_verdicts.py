@@ -117,7 +117,7 @@ def test_verdicts_are_read_off_the_posterior(sets, steps, accused, after, verdic
 
 def test_what_held_out_records_deny_does_not_carry_over_and_is_no_draw():
     found = SimpleNamespace(posterior=posterior(("viscous", 1.0)))
-    withdrawn = Withdrawn((step("viscous", False),), MISSED)
+    withdrawn = Withdrawn((step("viscous", False),), MISSED, 0.14)
     assert verdicts_of(found, (), ENOUGH, (), withdrawn) == ("does_not_carry_over",)
     # a name that is not claimed for that reason alone is not one of several
     assert verdicts_of(found, (), MISSED, (step("viscous", False),), None) == ("does_not_carry_over",)

@@ -95,8 +95,11 @@ def missed_records(fit: Fit, train: Residuals, holdout: Residuals | None) -> lis
         return []
     outputs, missed = [o.name for o in fit.model.plant.outputs], []
     known = {place: max(rms_of(train, place), 1.0) for place in {r.place for r in train.replays}}
-    edges = holdout.data.edges
+    edges, least = holdout.data.edges, least_noise(train, holdout)
     for i, (replay, raw) in enumerate(zip(holdout.replays, holdout.raw, strict=True)):
+        # the doubt is common to all records: what one of them misses would be laid to others, too
+        if rms(raw) <= OVER_NOISE * least[outputs[replay.place]]:
+            continue
         inside = slice(int(edges[i]), int(edges[i + 1]))
         # Divided by noise and doubt together: the start of a held-out record is known from few samples.
         factor = rms(holdout.residual[inside]) / known.get(replay.place, 1.0)

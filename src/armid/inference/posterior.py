@@ -27,6 +27,8 @@ NEGLIGIBLE = float(np.log(1e-6))
 UNSEEN = frozenset({("unknown", "an unknown place")})
 # A smaller p-value leaves no chance that arithmetic could hold.
 SMALLEST_P = 1e-12
+# A deviation of so many ranges is that of even odds.
+AS_EVEN = 100.0
 # What further unknowns of a model are, in words.
 CONSTANTS_TEXT = "constants within tolerances"
 # How far unknowns are moved along an axis of their posterior, in deviations; how often, as a wider axis is looked at
@@ -253,22 +255,18 @@ def most_odds(p: float) -> float:
 def of_parameters(about: Expansion, own: Sequence[str]) -> tuple[Array, Array]:
     """Return parameters at a fit, SI, and their covariance; NaN for those that it does not hold.
 
-    A strength has no other sign than its box: where the records hardly show it, it and what makes up for it are to one
-    side. Mean and covariance are those of the truncated normal distribution.
+    No parameter lies outside its box, and no strength has another sign: where the records hardly show one, it and what
+    makes up for it lie inside, and not about the end at which a fit happened to stop. Mean and covariance are those of
+    the truncated normal distribution, one parameter after the other.
     """
-    fit, covariance, moved = about.fit, spread(about), np.zeros(about.fit.n_free)
-    space, model = fit.records.space, fit.model
-    for i, name in enumerate(fit.values):
-        null, low, high = model.parameters[name].null, *(float(e[space.free][i]) for e in (space.low, space.high))
-        if about.library.owner(name) is None or null is None or low < null < high:
-            continue
-        deviation, side = float(np.sqrt(covariance[i, i])), 1.0 if null <= low else -1.0
-        size = side * (float(fit.z[i] + moved[i]) - (null - low) / (high - low))
+    fit, covariance, moved = about.fit, unbounded(about), np.zeros(about.fit.n_free)
+    for i in range(fit.n_free):
+        deviation, size = float(np.sqrt(covariance[i, i])), float(fit.z[i] + moved[i])
         if deviation <= 0.0:
             continue
-        mean, left = truncated(size, deviation)
+        mean, left = boxed(size, deviation)
         answer = covariance[:, i] / deviation**2
-        moved += answer * side * (mean - size)
+        moved += answer * (mean - size)
         covariance -= np.outer(answer, answer) * (deviation**2 - left**2)
     places, held = places_of(own, fit)
     span, values, all_values = fit.records.span[places], np.full(len(own), np.nan), np.array(list(fit.values.values()))
@@ -286,11 +284,17 @@ def places_of(own: Sequence[str], fit: Fit) -> tuple[list[int], list[int]]:
 
 
 def spread(about: Expansion) -> Array:
-    """Return the posterior covariance of the free parameters as it is reported: within their box all values are alike.
+    """Return the covariance of the free parameters, no deviation larger than that of even odds over the box."""
+    covariance = unbounded(about)
+    shrunk = np.minimum(1.0, np.sqrt(1.0 / 12.0 / np.maximum(np.diag(covariance), 1e-300)))
+    return np.asarray(covariance * np.outer(shrunk, shrunk))
+
+
+def unbounded(about: Expansion) -> Array:
+    """Return the posterior covariance of the free parameters, where within their box all values are alike.
 
     The normal prior of `precision`, which gives the evidence, would hold them closer; here it is one range wide, and of
-    a strength the size to expect, however wide its box. No deviation is larger than that of even odds over the box,
-    range/sqrt(12).
+    a strength the size to expect, however wide its box.
     """
     n, fit = int(about.kept.sum()), about.fit
     is_known = np.isin(np.arange(fit.n_free), fit.records.rows[0])[about.kept]
@@ -301,9 +305,7 @@ def spread(about: Expansion) -> Array:
     known = about.scale.weight * columns.T @ columns + np.diag(flat)
     if cover is not None:
         known = known - cover.taken(columns, about.scale.weight)
-    covariance = about.scale.variance(fit.chi2) * np.linalg.inv(known)[:n, :n]
-    shrunk = np.minimum(1.0, np.sqrt(1.0 / 12.0 / np.maximum(np.diag(covariance), 1e-300)))
-    return np.asarray(covariance * np.outer(shrunk, shrunk))
+    return np.asarray(about.scale.variance(fit.chi2) * np.linalg.inv(known)[:n, :n])
 
 
 def confirmed_slopes(fit: Fit, columns: Array, flat: Array, weight: float) -> Array:
@@ -429,6 +431,21 @@ def beside(
             atoms.append(Atom(weight - prior + float(ahead.log_factor[i, k]), prior, names | {hypothesis.public},
                               means, np.sqrt(squares)))  # fmt: skip
     return atoms
+
+
+def boxed(mean: float, deviation: float) -> tuple[float, float]:
+    """Return mean and deviation of the part of a normal distribution between 0 and 1."""
+    if mean > 0.5:
+        mirrored, left = boxed(1.0 - mean, deviation)
+        return 1.0 - mirrored, left
+    width = min(deviation, AS_EVEN)
+    if mean < -5.0 * width:
+        return truncated(mean, width)
+    low, high = -mean / width, (1.0 - mean) / width
+    inside = float(ndtr(-low) - ndtr(-high))
+    first, last = (float(np.exp(-0.5 * at * at) / np.sqrt(2.0 * np.pi)) / inside for at in (low, high))
+    square = 1.0 + low * first - high * last - (first - last) ** 2
+    return mean + width * (first - last), width * float(np.sqrt(max(square, 1e-12)))
 
 
 def truncated(mean: float, deviation: float) -> tuple[float, float]:

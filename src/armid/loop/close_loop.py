@@ -144,7 +144,7 @@ def close_loop(
     steps = steps_of(inference, path, judged, instead)
     kept = confirmed(judged)
     unclaimed = tuple(replace(step, claimed=False) for step in steps[kept:])
-    withdrawn = Withdrawn(unclaimed, judged[-1]) if unclaimed else None
+    withdrawn = Withdrawn(unclaimed, judged[-1], worse_by(judged)) if unclaimed else None
     if kept < len(path) - 1:  # a model of faults alone has no step
         inference, path = inference.without(path[-1] - path[kept], path[kept]), path[: kept + 1]
         judged = rejudged(inference, path, judged, within)
@@ -267,6 +267,12 @@ def confirmed(judged: Sequence[Judgement]) -> int:
     while kept > 0 and any(is_denied(j, judged[kept]) for j in judged[:kept]):
         kept -= 1
     return kept
+
+
+def worse_by(judged: Sequence[Judgement]) -> float:
+    """Return by which share the last model simulates held-out records worse than the best of those before it."""
+    *before, last = (j.holdout.errors.joint_nrmse for j in judged if j.holdout is not None)
+    return last / min(before) - 1.0
 
 
 def is_denied(before: Judgement, after: Judgement) -> bool:

@@ -518,12 +518,13 @@ def carried_sentence(loop: ClosedLoop) -> str:
                 f"that the train records do not show.{alone}")  # fmt: skip
     last = loop.after.holdout
     assert last is not None
-    worse = unseen.errors.joint_nrmse / last.errors.joint_nrmse - 1.0
     names = " + ".join(s.effect for s in loop.withdrawn.steps)
     stands = f"the model with {' + '.join(loop.effects)}" if loop.effects else "the declared model"
-    left = "" if any(over_noise(loop.after.train, last)) else " What it leaves of the records held out is noise."
-    return (f"Of all names {names} suits the train records best, but the records held out are simulated {worse:.0%} "
-            f"worse with it ({missed}): it is withdrawn, and {stands} stands.{left}")  # fmt: skip
+    is_noise = not (loop.after.diagnosis.significant or any(over_noise(loop.after.train, last)))
+    left = " What it leaves of the records held out is noise." if is_noise else ""
+    return (f"Of all names {names} suits the train records best, but the records held out are simulated "
+            f"{loop.withdrawn.worse:.0%} worse with it ({missed}): it is withdrawn, and {stands} "
+            f"stands.{left}")  # fmt: skip
 
 
 def doubtful(loop: ClosedLoop) -> str:

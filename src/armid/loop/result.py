@@ -179,10 +179,14 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Withdrawn:
-    """Hold an addition that the records held out denied: its steps, and the model that it was."""
+    """Hold an addition that the records held out denied: its steps, and the model that it was.
+
+    worse: by which share their error is larger with it than with the best of the models before it.
+    """
 
     steps: tuple[Step, ...]
     judged: Judgement
+    worse: float
 
 
 @dataclass(frozen=True, eq=False, repr=False)
