@@ -98,7 +98,7 @@ def nearest(word: str, known: Iterable[str]) -> str:
 def nearest_registered(word: str, known: Iterable[str]) -> str:
     """Return `nearest` among what plug-ins add to; where none is near, how one of the user's own is named."""
     hint = nearest(word, known)
-    return hint if hint.endswith("?") else f"{hint}; one of your own is a plug-in, FILE.py:NAME in `plugins`"
+    return hint if hint.endswith("?") else f"{hint}; one of your own is a plug-in, FILE.py:NAME"
 
 
 BRIEF = reprlib.Repr()

@@ -16,6 +16,7 @@ from armid.model.effects.sensor import sensor_effects
 from armid.record import read_campaign
 from armid.record.table import read_table
 from commands import ended
+from winch import winch
 
 START = np.array([0.1, 0.5, 0.05, 0.4])
 STARTS = dict(zip(("start_motor", "start_motor_speed", "start_load", "start_load_speed"), START, strict=True))
@@ -147,3 +148,18 @@ def test_columns_that_say_nothing_clear_are_refused(tmp_path, change, said):
         path.write_text(change(path.read_text()))
     with pytest.raises(ArmidError, match=said):
         read_campaign(folder, {"two_inertias": two_inertias})
+
+
+def test_sensors_of_a_speed_fit_no_output_in_another_unit():
+    """A drum turns in rad/s, the belt on it is recorded in m/s."""
+    belt = {"belt": lambda w: 0.08 * w, "recorded_speed": lambda belt, output: belt + output}
+    output = Output("belt_speed", "recorded_speed", "m/s", port="output")
+    plant = replace(winch, quantities=winch.quantities | belt, ports=winch.ports | {"output": "m/s"}, output="",
+                    output_unit="", outputs=(output,))  # fmt: skip
+    with pytest.raises(ArmidError, match="'gyro_lag', port 'output', asks for 'omega'"):
+        Model(plant) + EFFECTS["gyro_lag"]
+    found = sensor_effects(plant)
+    assert list(found) == ["belt_speed_bias", "belt_speed_scale", "belt_speed_delay", "belt_speed_lag"]
+    assert (Model(plant) + found["belt_speed_bias"]).parameters["belt_speed_bias.bias"].unit == "m/s"
+    assert Model(plant) + found["belt_speed_lag"]
+    assert not sensor_effects(winch)

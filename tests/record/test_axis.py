@@ -10,6 +10,8 @@ from armid.model import Constant, Input, Manoeuvre, Plant
 from armid.model.plants.driven_axis import driven_axis
 from armid.record import read_campaign
 from commands import refusing
+from synthetic import write_records
+from winch import INTERVAL, exact_speed, held_voltage, winch
 
 DEGREE, WAVE = np.pi / 180, np.sin(np.arange(5501) / 100)
 HOLDOUT = '\n[[records]]\nfile = "hold.csv"\nrole = "holdout"\n'
@@ -189,3 +191,12 @@ def test_what_is_known_beforehand_is_read(write_axis):
 def test_a_prior_that_means_nothing_is_refused(write_axis, prior, said):
     with refusing(said):
         read_campaign(write_axis(toml=AXIS.format(f"[priors]\n{prior}\n")))
+
+
+def test_an_input_is_read_in_another_unit_of_its_header(tmp_path):
+    volts = held_voltage(np.random.default_rng(2))
+    times = np.round(INTERVAL * np.arange(len(volts)), 9)
+    table = {"time_s": times, "angular_velocity_rad_s": exact_speed(volts, 0.0), "volts_mV": 1e3 * volts}
+    folder = write_records(tmp_path / "campaign", 'name = "winch"\nplant = "winch"\n', {"a.csv": table}, holdout=0)
+    (record,) = read_campaign(folder, {"winch": winch}).records
+    np.testing.assert_allclose(record.manoeuvre.inputs["volts"], volts)

@@ -258,6 +258,8 @@ def names_for(plant: Plant, effect: Effect | None, initial: bool) -> dict[str, s
     names |= {alias: names[name] for alias, name in plant.aliases.items() if name in names}
     if effect is None:
         return names
+    if "output" in effect.adds and not plant.records_omega:
+        names.pop("omega", None)
     for argument, name in effect.binds.items():
         if name not in names and not initial:
             raise ModelError(f"effect '{effect.name}' binds '{argument}' to '{name}', which nobody offers here: "

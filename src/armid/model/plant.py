@@ -324,6 +324,12 @@ class Plant:
         return tuple(size.get(o.unit, 1.0) for o in self.outputs)
 
     @property
+    def records_omega(self) -> bool:
+        """Whether the port `output` is in the unit of `omega`, so that the library's sensors of a speed fit there."""
+        omega = next((s.unit for s in self.states if s.name == self.aliases.get("omega", "omega")), "")
+        return self.ports.get("output", omega) == omega
+
+    @property
     def declared(self) -> list[str]:
         """Every name that the equations may use."""
         return [

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from armid.errors import ArmidError, nearest, quoted
-from armid.model import Array, Output, Plant
+from armid.model import Array, Input, Output, Plant
 from armid.model.plant import SPEEDS
 from armid.record.dialect import COMMENTS, Cells, cells_of, check_names, columns_of, text_of
 from armid.record.record import RecordWarning
@@ -264,7 +264,9 @@ def input_columns(plant: Plant, named: Mapping[str, str], table: CsvTable, where
     for wanted in plant.inputs:
         if wanted.name not in named:
             expected = f"one column for input '{wanted.name}' is expected, or its name under [records.inputs]"
-            column = table.only_one_of([name for name in wanted.columns if name in table.headers], expected)
+            known = [name for name in wanted.columns if name in table.headers]
+            known = known or [name for name in in_other_units(wanted) if name in table.headers]
+            column = table.only_one_of(known, expected)
             if column is not None:
                 columns[wanted.name] = column
             elif wanted.required:
@@ -273,6 +275,13 @@ def input_columns(plant: Plant, named: Mapping[str, str], table: CsvTable, where
                          for h in table.headers if h not in taken]  # fmt: skip
                 raise missing(table, f"column for input '{wanted.name}'", [*wanted.columns, *spare[:1]])
     return columns
+
+
+def in_other_units(wanted: Input) -> list[str]:
+    """Return the usual headers of an input with another end, such as voltage_mV for voltage_V."""
+    ends = [f"_{end}" for end in SUFFIXES.get(wanted.unit, {})]
+    stems = [name.removesuffix(end) for name in wanted.columns for end in ends if name.endswith(end)]
+    return [stem + end for stem in dict.fromkeys(stems) for end in ends]
 
 
 def usual_and_rarer(expected: Sequence[str]) -> tuple[str, str]:

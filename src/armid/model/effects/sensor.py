@@ -9,22 +9,23 @@ from armid.model.effect import Delay, Effect, State, slope_itself, start_speed, 
 from armid.model.parameter import Parameter
 from armid.model.plant import Output, Plant
 
-# Unit of an output -> unit of its bias; other units stay as they are.
-SCALES_OF_UNIT = {"rad/s": "speed", "m/s": "speed", "rad": "speed*s", "m": "speed*s", "N": "effort", "N m": "effort"}
-
 
 def sensor_effects(plant: Plant) -> dict[str, Effect]:
     """Return name -> bias, scale, delay and lag (`hub_angle_bias`) of each output that has a port of its own.
 
-    What the sensor sees is its signal without what is added at the port; a lag takes it from its own state.
+    At `output` the library's own are added where `omega` is what is recorded. What the sensor sees is its signal
+    without what is added at the port, where that is one state or quantity.
     """
-    effects = [e for o in plant.outputs if o.port not in ("", "output") for e in effects_at(o, plant)]
+    own = [o for o in plant.outputs if o.port and not (o.port == "output" and plant.records_omega)]
+    effects = [e for o in own for e in effects_at(o, plant)]
     return {e.name: e for e in effects}
 
 
 def effects_at(output: Output, plant: Plant) -> list[Effect]:
-    name, port = output.name, output.port
-    bias = Parameter("bias", SCALES_OF_UNIT.get(output.unit, output.unit), -0.1, 0.1, null=0.0)
+    name, port, scales = output.name, output.port, plant.scales
+    length = scales.length_unit
+    in_scales = {f"{length}/s": "speed", length: "speed*s", scales.effort_unit: "effort"}
+    bias = Parameter("bias", in_scales.get(output.unit, output.unit), -0.1, 0.1, null=0.0)
     declared = partial(Effect, source="Doebelin, Measurement Systems, chapter 3")
     effects = [declared(f"{name}_bias", (bias,), {port: bias_error}, note=f"constant error of {name}")]
     asked = signature(plant.quantities[output.signal]).parameters if output.signal in plant.quantities else ()
@@ -36,9 +37,8 @@ def effects_at(output: Output, plant: Plant) -> list[Effect]:
     effects.append(declared(f"{name}_scale", gyro_scale.parameters, {port: scale_error}, note=note))
     effects.append(declared(f"{name}_delay", output_delay.parameters, {port: delay_error}, delays=output_delay.delays,
                             note=f"{name} is recorded late by a dead time"))  # fmt: skip
-    if seen[0] in {s.name for s in plant.states}:
-        states, note = (State("lagging", output.unit, lagging_rate, start_speed),), f"{name} lags, first order"
-        effects.append(declared(f"{name}_lag", output_lag.parameters, {port: lag_error}, states, note=note))
+    states, note = (State("lagging", output.unit, lagging_rate, start_speed),), f"{name} lags, first order"
+    effects.append(declared(f"{name}_lag", output_lag.parameters, {port: lag_error}, states, note=note))
     return effects
 
 
