@@ -300,13 +300,19 @@ def swapped(
     fit: Fit, key: EffectKey, proposal: Proposal, variant: int, strength: float, library: Library, weight: float,
     limit: float,
 ) -> Fit | None:  # fmt: skip
-    """Return the model with one effect replaced by another, its shapes free where those of the old one are."""
+    """Return the model with one effect replaced by another, its shapes free where those of the old one are.
+
+    What both call by one name, as forms of an effect do, may have the value that it had.
+    """
     new: EffectKey = proposal.hypothesis.means
     new = replace(new, free_shape=key.free_shape and bool(library.fixed_shapes(new)))
     active = (*(k for k in fit.active if k != key), new)
     values = {n: v for n, v in fit.values.items() if not key.owns(n)}
     shares = library.reachable(strength * STRENGTHS_OF_FORM)
     guesses = [values | proposal.grid[variant].at(float(share)) for share in shares]
+    owned = {n.rpartition(".")[2]: v for n, v in fit.values.items() if key.owns(n)}
+    common = {n: owned[name] for n in guesses[0] if new.owns(n) and (name := n.rpartition(".")[2]) in owned}
+    guesses += [guesses[0] | common] if common else []
     return near(fit, active, guesses, library, weight, limit)
 
 
