@@ -14,7 +14,7 @@ from armid.inference.decisions import WINDOW
 from armid.inference.evidence import expansion_of, forecast
 from armid.inference.hypothesis import Hypothesis
 from armid.inference.kinds import effects, faults
-from armid.inference.library import Library
+from armid.inference.library import Activation, Library
 from armid.inference.model import best_along
 from armid.inference.moves import Exploration, drops
 from armid.inference.search import BEAM, MOST_EFFECTS, has_expanded_form, is_outdone, next_model
@@ -59,6 +59,22 @@ def test_another_form_of_an_effect_takes_its_place(explored):
     assert best["flux_saturation"] == ""
     assert "arctangent" in {h.form for model in found.exploration.fits for h in model if len(model) == 2}
     assert found.probabilities["effects"]["flux_saturation"] > 0.95
+
+
+def test_a_form_begins_where_the_other_one_ended(monkeypatch):
+    old, new = EffectKey("stribeck", "hess_soom", free_shape=True), EffectKey("stribeck")
+    values = {"inertia": 2.0, "stribeck_hess_soom.level": 1.4, "stribeck_hess_soom.fade": 0.09}
+    full = {"stribeck.level": 5.0, "stribeck.fade": 0.3, "stribeck.exponent": 2.0}
+    one = Activation(full, {"stribeck.level": 0.0}, 0.001)
+    library = SimpleNamespace(fixed_shapes=lambda key: ("stribeck.exponent",), reachable=lambda shares: shares)
+    proposal = SimpleNamespace(hypothesis=SimpleNamespace(means=new), grid=[one])
+    fitted = Mock()
+    monkeypatch.setattr(moves, "near", fitted)
+    moves.swapped(SimpleNamespace(active=(old,), values=values), old, proposal, 0, 0.5, library, 1.0, np.inf)
+    _, active, guesses, *_ = fitted.call_args.args
+    assert active == (EffectKey("stribeck", free_shape=True),)
+    assert guesses[-1] == {"inertia": 2.0, "stribeck.level": 1.4, "stribeck.fade": 0.09, "stribeck.exponent": 2.0}
+    assert {guess["stribeck.fade"] for guess in guesses[:-1]} == {0.3}
 
 
 @pytest.mark.slow
