@@ -306,11 +306,12 @@ def infer(library: Library, declared: Fit) -> Inference:
     All is repeated if inputs prove exact, noise in motion is another than at rest, or noise of inputs may be the rest.
     """
     inference = inferred(library, declared)
-    # First exact inputs: those that are wrongly taken for noisy look like noise in motion.
+    # First the inputs: those that are wrongly taken for noisy, or for exact, look like noise in motion.
     exact = with_exact_inputs(library, inference)
     is_exact = exact is not library
-    if is_exact:
-        library, declared = exact, declared_again(exact, declared)
+    noisy = exact if is_exact else with_answering_inputs(library, inference)
+    if noisy is not library:
+        library, declared = noisy, declared_again(noisy, declared)
         inference = inferred(library, declared)
     shown = with_noise_in_motion(library, inference)
     if shown is not library:
@@ -321,16 +322,23 @@ def infer(library: Library, declared: Fit) -> Inference:
         exact = with_exact_inputs(library, inference)
         if exact is not library:
             return inferred(exact, declared_again(exact, declared))
-    if is_exact or not pooled_noise(library.data.records):
-        return inference
+    noisy = library if is_exact else with_answering_inputs(library, inference)
+    return inference if noisy is library else inferred(noisy, declared_again(noisy, declared))
+
+
+def with_answering_inputs(library: Library, inference: Inference) -> Library:
+    """Return the library with noise of its inputs as the model in force answers to it, where that may be all it leaves.
+
+    The declared model may answer to its inputs quite otherwise.
+    """
     fit = inference.exploration.fits[inference.in_force]
-    if inference.in_force and inference.posterior.unknown_is_likely:
-        # the declared model may answer to its inputs quite otherwise
-        answering = with_measured_inputs(as_exact(library), fit)
-        if may_be_all(answering, fit):
-            library.say("the same with the noise of the inputs as the best model answers to it")
-            return inferred(answering, declared_again(answering, declared))
-    return inference
+    if not (inference.in_force and inference.posterior.unknown_is_likely and pooled_noise(library.data.records)):
+        return library
+    answering = with_measured_inputs(as_exact(library), fit)
+    if not may_be_all(answering, fit):
+        return library
+    library.say("the same with the noise of the inputs as the best model answers to it")
+    return answering
 
 
 def as_exact(library: Library) -> Library:
