@@ -61,6 +61,20 @@ def test_another_form_of_an_effect_takes_its_place(explored):
     assert found.probabilities["effects"]["flux_saturation"] > 0.95
 
 
+@pytest.mark.slow
+def test_a_wave_needs_five_periods_within_the_travel(stand):
+    campaign = read_campaign(stand(*MANOEUVRES))
+    library, declared = prepared(Model(campaign.plant), campaign, {"torque_ripple": EFFECTS["torque_ripple"]})
+    (key,) = library.candidates
+    space, waves = library.problem((key,)).space, "torque_ripple.waves"
+    least = 10.0 * np.pi / np.ptp(effects.positions(declared))
+    assert 20.0 < least < 30.0
+    assert space.low[space.index(waves)] == pytest.approx(least)
+    short = replace(library, least_waves=1e4, _problems={})
+    assert (library.joinable(()), short.joinable(())) == ([key], [])
+    assert replace(short, bounds={waves: (30.0, 60.0)}).joinable(()) == [key]
+
+
 def test_a_form_begins_where_the_other_one_ended(monkeypatch):
     old, new = EffectKey("stribeck", "hess_soom", free_shape=True), EffectKey("stribeck")
     values = {"inertia": 2.0, "stribeck_hess_soom.level": 1.4, "stribeck_hess_soom.fade": 0.09}

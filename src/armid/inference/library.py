@@ -232,10 +232,11 @@ class Library:
                 space = space.with_bounds(name, parameter.low, parameter.high)
             elif self.reach > 1.0 and mine is not None and name in space.free_names and name in self.scaled_strengths:
                 space = space.with_bounds(name, *self.box_of(name, parameter))
-        for name in (name for key in active for name in self.waves_of(key, model.parameters)):
-            low, high = model.parameters[name].low, model.parameters[name].high
-            if low < self.least_waves < high:
-                space = space.with_bounds(name, self.least_waves, high)
+        for key in active:
+            for name in self.waves_of(key, model.parameters):
+                low, high = model.parameters[name].low, model.parameters[name].high
+                if low < self.least_waves < high:
+                    space = space.with_bounds(name, self.least_waves, high)
         return space
 
     def box_of(self, name: str, parameter: Parameter) -> tuple[float, float]:
