@@ -22,7 +22,7 @@ NUMERICS = {
                               "MOST_BRIDGED", "STILL", "EVEN_SPEED", "MISFIT", "ENGINE_ERRORS", "CHANCE_OF_COLOUR",
                               "CERTAIN", "TRIFLE"),
     "what can be asked of records at all": ("FEWEST_RECORDS", "FEWEST_OTHERS", "MOVED", "SAME_PORT", "SAME_VARIABLE",
-                                        "SAME_ORDER", "SAME_LAW", "OF_WAVES"),
+                                        "SAME_ORDER", "SAME_LAW", "OF_WAVES", "LARGEST_DRIFT"),
     "layout of pages": ("MOST_DRAWN", "MOST_CONSTANTS", "SHIFTED", "LEAST_SHARE", "WEAK", "REPORT_VERSION"),
 }  # fmt: skip
 # Plain numbers in comparisons that are no decision either: a half, rounding, and where a series or a range turns.

@@ -1,12 +1,13 @@
 """What does not carry over is reported: how far records are missed, what is new in them, what may have changed."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import armid
-from armid.inference.carry_over import Missed
+from armid.inference.carry_over import Missed, late
 from armid.loop.document import conclusion
 from armid.model import PLANTS
 from synthetic import write_records
@@ -72,6 +73,17 @@ def test_a_parameter_that_changed_between_the_records_and_records_that_are_alike
     found = closed(tmp_path / "alike", amplitude=1.0)
     assert found.verdict == "no_discrepancy"
     assert found.after.missed == []
+
+
+@pytest.mark.parametrize(("lateness", "gain", "found"), [(0.02, 1.0, 0.02), (-0.0315, 1.0, -0.0315), (0.0, 1.2, 0.0)])
+def test_a_held_out_record_that_starts_late_is_told(lateness, gain, found):
+    times = 0.01 * np.arange(400)
+    signal, measured = np.sin(3.0 * times) + times, np.sin(3.0 * (times - lateness)) + times - lateness
+    replay = SimpleNamespace(signal=lambda _: signal[np.newaxis], measured=gain * measured, pieces=[None],
+                             record=SimpleNamespace(spacing=0.01))  # fmt: skip
+    assert late(replay, np.zeros(1)) == pytest.approx(found, abs=1e-3)
+    said = Missed("held.csv", 9.0, (2.0, 1.0), "m/s", {}, {}, found).sentence
+    assert ("does it start late?" in said, "does it start early?" in said) == (found > 0.0, found < 0.0)
 
 
 def test_a_record_that_only_the_doubt_lets_be_missed_confirms_nothing(tmp_path):

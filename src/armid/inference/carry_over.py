@@ -19,14 +19,19 @@ from armid.estimation.least_squares import descend
 from armid.inference.checks import Residuals
 from armid.inference.decisions import EXPLAINS, NOT_CARRIED, OUTSIDE, OVER_NOISE
 from armid.inference.hypothesis import Hypotheses
+from armid.inference.kinds.drifts import LARGEST_DRIFT
+from armid.inference.kinds.faults import PLAUSIBLE
 from armid.inference.library import Library
 from armid.inference.model import ROUGHLY, Fit
 from armid.inference.whitening import WhitenedData, WhiteRecords
 from armid.model import Array
+from armid.problem.problem import Replay
 from armid.units import behind, shown
 
 # Parts that are left out in turn; models of each number of effects that are compared.
 PARTS_LEFT_OUT, MOST_OF_SIZE = 5, 3
+# Shifts at which a held-out record is compared: by half a millisecond.
+N_SHIFTS = 201
 
 
 @dataclass(frozen=True)
@@ -35,7 +40,8 @@ class Missed:
 
     factor: its error over that of the train records, in units of noise and doubt. errors: both, [unit of the output].
     outside: variable -> (its value farthest outside, the nearest end of the range of the train records, unit).
-    changes: parameter -> relative change that would take away most of its error.
+    changes: parameter -> relative change that would take away most of its error. late: shift of its times [s] that
+    would, 0 where none does.
     """
 
     record: str
@@ -44,6 +50,7 @@ class Missed:
     unit: str
     outside: Mapping[str, tuple[float, float, str]]
     changes: Mapping[str, float]
+    late: float = 0.0
 
     @property
     def sentence(self) -> str:
@@ -57,7 +64,10 @@ class Missed:
                      f"{shown(end, unit)[0]:.3g})" for name, (value, end, unit) in self.outside.items()]  # fmt: skip
             said.append(f"It leaves the range of the train records: {', '.join(reach)}. Effects that show only there "
                         "cannot be found; train on such a record.")  # fmt: skip
-        if self.changes:
+        if self.late:
+            word = "late" if self.late > 0.0 else "early"
+            said.append(f"Shifted by {1e3 * abs(self.late):.3g} ms most of this error is gone: does it start {word}?")
+        elif self.changes:
             name, change = next(iter(self.changes.items()))
             said.append(f"A change of {name} by {change:+.1%} would explain most of this error: has it changed?")
         return " ".join(said)
@@ -108,7 +118,8 @@ def missed_records(fit: Fit, train: Residuals, holdout: Residuals | None) -> lis
         output = outputs[replay.place]
         before = train.errors.outputs[output].rmse if output in train.errors.outputs else holdout.noise_of[output]
         missed.append(Missed(replay.name, factor, (rms(raw), before), replay.record.unit,
-                             outside(train, holdout, inside), changes(fit, holdout, inside)))  # fmt: skip
+                             outside(train, holdout, inside), changes(fit, holdout, inside),
+                             late(replay, fit.candidate)))  # fmt: skip
     return missed
 
 
@@ -166,9 +177,22 @@ def changes(fit: Fit, holdout: Residuals, inside: slice) -> dict[str, float]:
             continue
         moved = float(column @ own) / square
         taken = moved**2 * square / total
-        if taken > EXPLAINS:
-            changes[name] = (taken, moved * float(fit.records.span[i]) / abs(value))
+        change = moved * float(fit.records.span[i]) / abs(value)
+        if taken > EXPLAINS and abs(change) <= LARGEST_DRIFT:
+            changes[name] = (taken, change)
     return {name: change for name, (_, change) in sorted(changes.items(), key=lambda pair: -pair[1][0])}
+
+
+def late(replay: Replay, candidate: Array) -> float:
+    """Return by how much a record is late, where a shift of its times takes away most of its error [s], else 0."""
+    signal, measured, step = replay.signal(candidate[np.newaxis])[0], replay.measured, replay.record.spacing
+    if len(replay.pieces) > 1 or not np.isfinite(signal).all():
+        return 0.0
+    samples = np.arange(len(signal))
+    shifts = np.linspace(-PLAUSIBLE["late"], PLAUSIBLE["late"], N_SHIFTS)
+    left = [rms(measured - np.interp(samples - shift / step, samples, signal)) ** 2 for shift in shifts]
+    best = int(np.argmin(left))
+    return float(shifts[best]) if left[best] < (1.0 - EXPLAINS) * rms(measured - signal) ** 2 else 0.0
 
 
 def predicting_best(
