@@ -36,7 +36,6 @@ from armid.model import EFFECTS, Array, Effect, Model
 from armid.model.effects.sensor import sensor_effects
 from armid.problem.space import Space
 from armid.record import Campaign
-from armid.report.document import NO_MORE
 
 # By which factor strengths that scale with the machine may exceed their declared range.
 REACH_OF_STRENGTHS = 16.0
@@ -327,18 +326,31 @@ def infer(library: Library, declared: Fit) -> Inference:
 
 
 def with_answering_inputs(library: Library, inference: Inference) -> Library:
-    """Return the library with noise of its inputs as the model in force answers to it, where that may be all it leaves.
+    """Return the library with noise of its inputs as the model in force answers to it, if that is all that it leaves.
 
-    The declared model may answer to its inputs quite otherwise.
+    The records have to be more probable so than with a signal without a form. The declared model, and one without a
+    fault of a record, may answer to the inputs quite otherwise.
     """
-    fit = inference.exploration.fits[inference.in_force]
+    fit, best = inference.exploration.fits[inference.in_force], inference.best
     if not (inference.in_force and inference.posterior.unknown_is_likely and pooled_noise(library.data.records)):
         return library
     answering = with_measured_inputs(as_exact(library), fit)
-    if not may_be_all(answering, fit):
+    if not matters(answering, fit):
+        return library
+    again = fitted_to(answering, fit, inference)
+    if is_significant(again) or again.log_density <= best.log_density - 0.5 * best.records.data.log_cover:
         return library
     library.say("the same with the noise of the inputs as the best model answers to it")
     return answering
+
+
+def fitted_to(library: Library, fit: Fit, inference: Inference) -> Fit:
+    """Return a model of an inference fitted to other data of the same records, constants and faults free."""
+    problem = library.problem(fit.active, fit.values)
+    again = accurate(fit_from(problem, fit.active, [start_of(problem, fit.values)]), library)
+    if not fit.others:
+        return again
+    return freed(again, again.records, [f.unknown for f in fit.others], inference.exploration.scale().weight)
 
 
 def as_exact(library: Library) -> Library:
@@ -356,20 +368,10 @@ def with_exact_inputs(library: Library, inference: Inference) -> Library:
     if exact is library:
         return library
     fit = inference.exploration.fits[inference.named[0]]
-    problem = exact.problem(fit.active, fit.values)
-    again = accurate(fit_from(problem, fit.active, [start_of(problem, fit.values)]), exact)
-    if fit.others:
-        again = freed(again, again.records, [f.unknown for f in fit.others], inference.exploration.scale().weight)
-    if again.log_density <= fit.log_density:
+    if fitted_to(exact, fit, inference).log_density <= fit.log_density:
         return library
     library.say("the inputs count as exact: the records are more probable so")
     return exact
-
-
-def may_be_all(library: Library, fit: Fit) -> bool:
-    """Tell whether noise of the inputs may be all of what a model leaves of a signal beyond the noise of its sensor."""
-    return any(level.moved > TRIFLE * left and left < NO_MORE * float(np.hypot(level.rms, level.moved))
-               for level, left in moved_and_left(library, fit))  # fmt: skip
 
 
 def matters(library: Library, fit: Fit) -> bool:
