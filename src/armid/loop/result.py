@@ -426,7 +426,8 @@ def fault_of(hypothesis: Hypothesis, fit: Fit, inference: Inference) -> RecordFa
 
 def change_of(hypothesis: Hypothesis, fit: Fit, inference: Inference) -> RecordFault:
     what: OfParameter = hypothesis.means
-    factor, unit, kind = what.reach(fit), "1", "parameter" if what.file else "trend"
+    undone: Any = next(f.unknown.moved for f in fit.others if f.unknown.name == hypothesis.size_name)
+    factor, unit, kind = undone.reach, "of its value", "parameter" if what.file else "trend"
     if what.product is None:
         place = list(fit.values).index(what.name)
         factor, unit = factor * float(fit.records.span[place]), fit.model.parameters[what.name].unit
@@ -475,7 +476,6 @@ def fault_sentence(s: RecordFault) -> str:
         return f"{s.record} looks like a record of another load, or of other inputs than it tells."
     if s.parameter:
         grew, (low, high) = ("larger" if s.value > 0.0 else "smaller"), along(s.value, s.low, s.high)
-        factor, unit = (100.0, "%") if s.unit == "1" else (factor, unit)
         size = sized(factor * abs(s.value), factor * low, factor * high, unit)
         changed = f"{' or '.join(s.parameter.split(', '))} is {size} {grew}"
         if s.kind == "parameter":

@@ -54,11 +54,11 @@ class OfParameter:
         """Return what takes the change out of records, taken about a fit and a size of it."""
         records = fit.base or fit.records
         firsts, changes = [i for i, replay in enumerate(records.replays) if replay.index == 0], []
-        at, names = records.shares(free_values(records, fit.values)), records.space.free_names
+        at, names, reach = records.shares(free_values(records, fit.values)), records.space.free_names, self.reach(fit)
         for weight, index in zip(self.weights(records), firsts, strict=True):
             if weight == 0.0:
                 continue
-            share = size * self.reach(fit) * weight * np.array([0.0, 0.5, 1.0])
+            share = size * reach * weight * np.array([0.0, 0.5, 1.0])
             Z, shares = np.tile(at, (3, 1)), {name: np.full(3, off) for name, off in fit.constants.items()}
             if self.product is not None:
                 name = self.product.names[0]
@@ -66,18 +66,19 @@ class OfParameter:
             else:
                 Z += np.outer(share, [name == self.name for name in names])
             changes.append((index, tuple(x[0] - x[1:] for x in simulated_file(records, index, Z, shares))))
-        return Undone(size, tuple(changes))
+        return Undone(size, reach, tuple(changes))
 
 
 @dataclass(frozen=True, eq=False)
 class Undone:
     """Return records as they would be without a change: a parabola through none, a half and a whole.
 
-    size: of the whole. changes: of each file its index, and of each of its signals what a half and the whole change,
-    (2, n_samples).
+    size: of the whole. reach: largest plausible size, see `OfParameter.reach`. changes: of each file its index, and of
+    each of its signals what a half and the whole change, (2, n_samples).
     """
 
     size: float
+    reach: float
     changes: tuple[tuple[int, tuple[Array, ...]], ...]
 
     def __call__(self, records: WhiteRecords, value: float) -> WhiteRecords:
