@@ -23,7 +23,7 @@ from armid.record import read_campaign
 
 MANOEUVRES = ("--manoeuvres", "lower,raise,short,empty", "--holdout", "", "--repeats", "1", "--duration", "0.8")
 # Candidates of one compiled model, of which a test asks for some.
-FEW = ("coulomb", "flux_saturation", "stribeck", "supply_sag")
+FEW = ("coulomb", "flux_saturation", "stribeck", "supply_sag", "torque_ripple")
 
 
 @pytest.fixture
@@ -64,15 +64,15 @@ def test_another_form_of_an_effect_takes_its_place(explored):
 @pytest.mark.slow
 def test_a_wave_needs_five_periods_within_the_travel(stand):
     campaign = read_campaign(stand(*MANOEUVRES))
-    library, declared = prepared(Model(campaign.plant), campaign, {"torque_ripple": EFFECTS["torque_ripple"]})
-    (key,) = library.candidates
+    library, declared = prepared(Model(campaign.plant), campaign, {n: EFFECTS[n] for n in FEW})
+    key = EffectKey("torque_ripple")
     space, waves = library.problem((key,)).space, "torque_ripple.waves"
     least = 10.0 * np.pi / np.ptp(effects.positions(declared))
     assert 20.0 < least < 30.0
     assert space.low[space.index(waves)] == pytest.approx(least)
     short = replace(library, least_waves=1e4, _problems={})
-    assert (library.joinable(()), short.joinable(())) == ([key], [])
-    assert replace(short, bounds={waves: (30.0, 60.0)}).joinable(()) == [key]
+    assert (key in library.joinable(()), key in short.joinable(())) == (True, False)
+    assert key in replace(short, bounds={waves: (30.0, 60.0)}).joinable(())
 
 
 def test_a_form_begins_where_the_other_one_ended(monkeypatch):
