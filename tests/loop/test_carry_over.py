@@ -79,11 +79,10 @@ def test_a_parameter_that_changed_between_the_records_and_records_that_are_alike
 def test_a_held_out_record_that_starts_late_is_told(lateness, gain, found):
     times = 0.01 * np.arange(400)
     signal, measured = np.sin(3.0 * times) + times, np.sin(3.0 * (times - lateness)) + times - lateness
-    replay = SimpleNamespace(signal=lambda _: signal[np.newaxis], measured=gain * measured, pieces=[None],
-                             record=SimpleNamespace(spacing=0.01))  # fmt: skip
-    assert late(replay, np.zeros(1)) == pytest.approx(found, abs=1e-3)
-    said = Missed("held.csv", 9.0, (2.0, 1.0), "m/s", {}, {}, found).sentence
-    assert ("does it start late?" in said, "does it start early?" in said) == (found > 0.0, found < 0.0)
+    replay = SimpleNamespace(measured=gain * measured, pieces=[None], record=SimpleNamespace(spacing=0.01))
+    assert late(replay, gain * measured - signal) == pytest.approx(found, abs=1e-3)
+    sentence = Missed("held.csv", 9.0, (2.0, 1.0), "m/s", {}, {}, found).sentence
+    assert ("does it start late?" in sentence, "does it start early?" in sentence) == (found > 0.0, found < 0.0)
 
 
 def test_a_record_that_only_the_doubt_lets_be_missed_confirms_nothing(tmp_path):

@@ -53,7 +53,7 @@ class DataIssue:
     kind: "sign", "unit", "gain", "time", "late", "exchanged", "absolute", "zero", "key", "angle" (of a key), "input",
     "bounds", "position", "noise", "rest", "twice", "start", "unlike" or "unjudged" (no mistake was found, and the
     model misses most of a record). record: file, "" for every train record. after: rms error over rms of the signal
-    with the mistake undone. factor: of its correction, NaN where there is none.
+    with the mistake undone. factor: of its correction, NaN without one.
     """
 
     kind: str
@@ -79,8 +79,8 @@ class Correction:
 
     def issue(self, record: str, before: float, after: float) -> DataIssue:
         who = record or "every train record"
-        said = f"{who}: {self.words} the error falls from {before:.3g} to {after:.2g} of the signal"
-        return DataIssue(self.kind, record, f"{said}.", after, self.factor)
+        text = f"{who}: {self.words} the error falls from {before:.3g} to {after:.2g} of the signal"
+        return DataIssue(self.kind, record, f"{text}.", after, self.factor)
 
 
 WIDER_BOUNDS = Correction("bounds", np.nan, "bounds or fixed values look wrong: with those that the model declares",

@@ -56,21 +56,21 @@ class Missed:
     def sentence(self) -> str:
         error, train = (shown(e, self.unit)[0] for e in self.errors)
         unit = shown(1.0, self.unit)[1]
-        said = [f"{self.record} does not carry over: it is missed by {error:.3g} {unit}, the train "
-                f"records by {train:.3g}. Measured by noise and by the doubt "
-                f"of the parameters, this is {self.factor:.3g} times as much."]  # fmt: skip
+        texts = [f"{self.record} does not carry over: it is missed by {error:.3g} {unit}, the train "
+                 f"records by {train:.3g}. Measured by noise and by the doubt "
+                 f"of the parameters, this is {self.factor:.3g} times as much."]  # fmt: skip
         if self.outside:
             reach = [f"{name} reaches {shown(value, unit)[0]:.3g}{behind(shown(1.0, unit)[1])} (train: "
                      f"{shown(end, unit)[0]:.3g})" for name, (value, end, unit) in self.outside.items()]  # fmt: skip
-            said.append(f"It leaves the range of the train records: {', '.join(reach)}. Effects that show only there "
-                        "cannot be found; train on such a record.")  # fmt: skip
+            texts.append(f"It leaves the range of the train records: {', '.join(reach)}. Effects that show only there "
+                         "cannot be found; train on such a record.")  # fmt: skip
         if self.late:
             word = "late" if self.late > 0.0 else "early"
-            said.append(f"Shifted by {1e3 * abs(self.late):.3g} ms most of this error is gone: does it start {word}?")
+            texts.append(f"Shifted by {1e3 * abs(self.late):.3g} ms most of this error is gone: does it start {word}?")
         elif self.changes:
             name, change = next(iter(self.changes.items()))
-            said.append(f"A change of {name} by {change:+.1%} would explain most of this error: has it changed?")
-        return " ".join(said)
+            texts.append(f"A change of {name} by {change:+.1%} would explain most of this error: has it changed?")
+        return " ".join(texts)
 
 
 def missed_sentences(missed: Sequence[Missed]) -> list[str]:
@@ -105,10 +105,10 @@ def missed_records(fit: Fit, train: Residuals, holdout: Residuals | None) -> lis
         return []
     outputs, missed = [o.name for o in fit.model.plant.outputs], []
     known = {place: max(rms_of(train, place), 1.0) for place in {r.place for r in train.replays}}
-    edges, least = holdout.data.edges, least_noise(train, holdout)
-    for i, (replay, raw) in enumerate(zip(holdout.replays, holdout.raw, strict=True)):
-        # the doubt is common to all records: what one of them misses would be laid to others, too
-        if rms(raw) <= OVER_NOISE * least[outputs[replay.place]]:
+    edges, flags = holdout.data.edges, over_noise_of_each(train, holdout)
+    for i, (replay, raw, is_over) in enumerate(zip(holdout.replays, holdout.raw, flags, strict=True)):
+        # The doubt is common to all records: an error of one of them would count as one of the others, too.
+        if not is_over:
             continue
         inside = slice(int(edges[i]), int(edges[i + 1]))
         # Divided by noise and doubt together: the start of a held-out record is known from few samples.
@@ -119,18 +119,23 @@ def missed_records(fit: Fit, train: Residuals, holdout: Residuals | None) -> lis
         before = train.errors.outputs[output].rmse if output in train.errors.outputs else holdout.noise_of[output]
         missed.append(Missed(replay.name, factor, (rms(raw), before), replay.record.unit,
                              outside(train, holdout, inside), changes(fit, holdout, inside),
-                             late(replay, fit.candidate)))  # fmt: skip
+                             late(replay, raw)))  # fmt: skip
     return missed
 
 
 def over_noise(train: Residuals, holdout: Residuals) -> list[bool]:
     """Return of each held-out record whether it is missed by more than noise, as it is there and on train records."""
-    outputs, flags = [o.name for o in train.model.plant.outputs], dict[str, bool]()
-    least = least_noise(train, holdout)
-    for replay, raw in zip(holdout.replays, holdout.raw, strict=True):
-        is_noise = rms(raw) <= OVER_NOISE * least[outputs[replay.place]]
-        flags[replay.record.file] = flags.get(replay.record.file, False) or not is_noise
+    flags = dict[str, bool]()
+    for replay, is_over in zip(holdout.replays, over_noise_of_each(train, holdout), strict=True):
+        flags[replay.record.file] = flags.get(replay.record.file, False) or is_over
     return list(flags.values())
+
+
+def over_noise_of_each(train: Residuals, holdout: Residuals) -> list[bool]:
+    """Return the same of each signal of the held-out records."""
+    outputs, least = [o.name for o in train.model.plant.outputs], least_noise(train, holdout)
+    return [not rms(raw) <= OVER_NOISE * least[outputs[replay.place]]
+            for replay, raw in zip(holdout.replays, holdout.raw, strict=True)]  # fmt: skip
 
 
 def least_noise(train: Residuals, holdout: Residuals) -> dict[str, float]:
@@ -183,16 +188,19 @@ def changes(fit: Fit, holdout: Residuals, inside: slice) -> dict[str, float]:
     return {name: change for name, (_, change) in sorted(changes.items(), key=lambda pair: -pair[1][0])}
 
 
-def late(replay: Replay, candidate: Array) -> float:
-    """Return by how much a record is late, where a shift of its times takes away most of its error [s], else 0."""
-    signal, measured, step = replay.signal(candidate[np.newaxis])[0], replay.measured, replay.record.spacing
-    if len(replay.pieces) > 1 or not np.isfinite(signal).all():
+def late(replay: Replay, raw: Array) -> float:
+    """Return by how much a record is late, where a shift of its times takes away most of its error [s], else 0.
+
+    raw: measured minus simulated, (n_samples,).
+    """
+    measured, step = replay.measured, replay.record.spacing
+    if len(replay.pieces) > 1 or not np.isfinite(raw).all():
         return 0.0
-    samples = np.arange(len(signal))
+    samples, simulated = np.arange(len(raw)), measured - raw
     shifts = np.linspace(-PLAUSIBLE["late"], PLAUSIBLE["late"], N_SHIFTS)
-    left = [rms(measured - np.interp(samples - shift / step, samples, signal)) ** 2 for shift in shifts]
+    left = [rms(measured - np.interp(samples - shift / step, samples, simulated)) ** 2 for shift in shifts]
     best = int(np.argmin(left))
-    return float(shifts[best]) if left[best] < (1.0 - EXPLAINS) * rms(measured - signal) ** 2 else 0.0
+    return float(shifts[best]) if left[best] < (1.0 - EXPLAINS) * rms(raw) ** 2 else 0.0
 
 
 def predicting_best(

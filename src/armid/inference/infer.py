@@ -307,10 +307,10 @@ def infer(library: Library, declared: Fit) -> Inference:
     inference = inferred(library, declared)
     # First the inputs: those that are wrongly taken for noisy, or for exact, look like noise in motion.
     exact = with_exact_inputs(library, inference)
-    is_exact = exact is not library
-    noisy = exact if is_exact else with_answering_inputs(library, inference)
-    if noisy is not library:
-        library, declared = noisy, declared_again(noisy, declared)
+    is_exact, asked = exact is not library, inference
+    other = exact if is_exact else with_answering_inputs(library, inference)
+    if other is not library:
+        library, declared = other, declared_again(other, declared)
         inference = inferred(library, declared)
     shown = with_noise_in_motion(library, inference)
     if shown is not library:
@@ -321,8 +321,8 @@ def infer(library: Library, declared: Fit) -> Inference:
         exact = with_exact_inputs(library, inference)
         if exact is not library:
             return inferred(exact, declared_again(exact, declared))
-    noisy = library if is_exact else with_answering_inputs(library, inference)
-    return inference if noisy is library else inferred(noisy, declared_again(noisy, declared))
+    other = library if is_exact or inference is asked else with_answering_inputs(library, inference)
+    return inference if other is library else inferred(other, declared_again(other, declared))
 
 
 def with_answering_inputs(library: Library, inference: Inference) -> Library:
@@ -331,17 +331,23 @@ def with_answering_inputs(library: Library, inference: Inference) -> Library:
     The records have to be more probable so than with a signal without a form. The declared model, and one without a
     fault of a record, may answer to the inputs quite otherwise.
     """
-    fit, best = inference.exploration.fits[inference.in_force], inference.best
+    fit = inference.exploration.fits[inference.in_force]
     if not (inference.in_force and inference.posterior.unknown_is_likely and pooled_noise(library.data.records)):
         return library
     answering = with_measured_inputs(as_exact(library), fit)
     if not matters(answering, fit):
         return library
     again = fitted_to(answering, fit, inference)
-    if is_significant(again) or again.log_density <= best.log_density - 0.5 * best.records.data.log_cover:
+    if is_significant(again) or not is_likelier(again, inference):
         return library
     library.say("the same with the noise of the inputs as the best model answers to it")
     return answering
+
+
+def is_likelier(fit: Fit, inference: Inference) -> bool:
+    """Tell whether the records are more probable by a fit, with other noise, than by the best model."""
+    best = inference.best
+    return fit.log_density > best.log_density - 0.5 * best.records.data.log_cover
 
 
 def fitted_to(library: Library, fit: Fit, inference: Inference) -> Fit:
@@ -461,7 +467,7 @@ def with_noise_in_motion(library: Library, inference: Inference) -> Library:
     test finds more. If a model may be right and records have no rest, alternating noise is looked for too: its
     differences make it look larger than it is, which hides effects.
     """
-    fit, best = inference.exploration.fits[inference.in_force], inference.best
+    fit = inference.exploration.fits[inference.in_force]
     is_unknown, read = inference.posterior.unknown_is_likely, library.as_read or library.data
     if not is_unknown and read.known:
         return library
@@ -473,8 +479,7 @@ def with_noise_in_motion(library: Library, inference: Inference) -> Library:
     noisy = with_measured_inputs(noisy, fit) if library.as_read else noisy
     problem = replace(fit.records, data=noisy.data)
     shown = Fit(fit.active, problem, fit.z, problem.plain.residuals(fit.z)[0])
-    has_more = is_unknown and is_significant(shown)
-    if has_more or shown.log_density <= best.log_density - 0.5 * best.records.data.log_cover:
+    if (is_unknown and is_significant(shown)) or not is_likelier(shown, inference):
         return library
     library.say("the noise in motion is another than at rest: the records are more probable so")
     return noisy

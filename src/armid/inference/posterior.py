@@ -443,7 +443,7 @@ def boxed(mean: float, deviation: float) -> tuple[float, float]:
         return truncated(mean, width)
     low, high = -mean / width, (1.0 - mean) / width
     inside = float(ndtr(-low) - ndtr(-high))
-    first, last = (float(np.exp(-0.5 * at * at) / np.sqrt(2.0 * np.pi)) / inside for at in (low, high))
+    first, last = density(low) / inside, density(high) / inside
     square = 1.0 + low * first - high * last - (first - last) ** 2
     return mean + width * (first - last), width * float(np.sqrt(max(square, 1e-12)))
 
@@ -454,5 +454,10 @@ def truncated(mean: float, deviation: float) -> tuple[float, float]:
         size = deviation**2 / max(-mean, 1e-300)
         return size, size
     at = mean / deviation
-    ratio = float(np.exp(-0.5 * at * at) / np.sqrt(2.0 * np.pi) / ndtr(at))
+    ratio = density(at) / float(ndtr(at))
     return mean + deviation * ratio, deviation * float(np.sqrt(max(1.0 - ratio * (at + ratio), 1e-6)))
+
+
+def density(at: float) -> float:
+    """Return the density of the standard normal distribution."""
+    return float(np.exp(-0.5 * at * at) / np.sqrt(2.0 * np.pi))

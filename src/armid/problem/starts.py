@@ -22,7 +22,7 @@ from armid.problem.space import Space
 from armid.record import Piece
 from armid.record.record import Samples, StartCorrection
 from armid.record.sensor import correlation_sum
-from armid.record.start import outputs_at, with_outputs_moved
+from armid.record.start import VisibleOutputs
 
 # Step of the differences, as a share of the plant's speed scale; a speed held for a second is the size of a position.
 MOVE = 1e-4
@@ -201,7 +201,30 @@ class Start:
         """Return the piece from the best start of a candidate, as it is where the candidate diverges."""
         constants, population = self.constants, candidate[np.newaxis]
         signals, slopes = self.linear(constants, population)
-        return replace(self, off=self.off_by(signals[:, 0, 0])).fitted_from(constants, signals, slopes, population)
+        start = replace(self, off=self.off_by(signals[:, 0, 0]))
+        for _ in range(MOST_OF_START):
+            residual, seen = start.residual(signals)[0], start.seen_slopes(slopes)[:, 0]
+            if not (np.isfinite(residual).all() and np.isfinite(seen).all()):
+                return self.piece
+            misfit = start.misfit(residual, seen)
+            gain, offset = start.answer(constants, seen, misfit)
+            shorter = constants + (gain @ residual + offset) / 2.0 ** np.arange(MOST_HALVINGS)[:, np.newaxis]
+            tried = start.residual(start.signals(shorter, np.repeat(population, MOST_HALVINGS, axis=0)))
+            before, costs = start.cost(constants, residual, misfit), start.cost(shorter, tried, misfit)
+            better = np.flatnonzero(costs < before)
+            if not len(better):
+                break
+            constants = shorter[better[0]]
+            signals, slopes = start.linear(constants, population)
+            if before - costs[better[0]] < ARRIVED_START:
+                break
+        if not np.isfinite(slopes).all():
+            return self.piece
+        gain, offset = start.answer(constants, start.seen_slopes(slopes)[:, 0], misfit)
+        correction = StartCorrection(start.places, slopes[:, :, 0], gain * start.weights, offset, start.measured,
+                                     start.samples)  # fmt: skip
+        known = dict(zip(self.names, map(float, constants), strict=True))
+        return replace(self.piece.with_constants(known), correction=correction)
 
     def read(self, candidate: Array) -> Piece:
         """Return the piece from where the outputs of a candidate are as the reader saw them."""
@@ -216,40 +239,13 @@ class Start:
 
         The plant's own outputs are functions of its states: what a model shows besides is what its sensors are off by.
         """
-        plant, known = self.ready.model.plant, self.piece.manoeuvre.constants
+        plant = self.ready.model.plant
+        outputs = VisibleOutputs(plant, self.piece.manoeuvre.constants)
         start = dict(zip(self.names, map(float, self.constants), strict=True))
-        own = outputs_at(plant, start, known)
-        shown = {plant.outputs[place].name: float(y) for place, y in zip(self.places, first, strict=True)}
-        beside = {name: y - own[name] for name, y in shown.items() if name in own}
-        moved = with_outputs_moved(plant, start, known, beside)
+        simulated = {plant.outputs[place].name: float(y) for place, y in zip(self.places, first, strict=True)}
+        by_sensors = {name: simulated[name] - own for name, own in outputs.at(start).items() if name in simulated}
+        moved = outputs.moved(start, by_sensors)
         return np.array([moved[name] - start[name] for name in self.names])
-
-    def fitted_from(self, constants: Array, signals: Array, slopes: Array, population: Array) -> Piece:
-        """Return the piece from the best start; signals, slopes: about some start, see `linear`."""
-        piece = self.piece
-        for _ in range(MOST_OF_START):
-            residual, seen = self.residual(signals)[0], self.seen_slopes(slopes)[:, 0]
-            if not (np.isfinite(residual).all() and np.isfinite(seen).all()):
-                return piece
-            misfit = self.misfit(residual, seen)
-            gain, offset = self.answer(constants, seen, misfit)
-            shorter = constants + (gain @ residual + offset) / 2.0 ** np.arange(MOST_HALVINGS)[:, np.newaxis]
-            tried = self.residual(self.signals(shorter, np.repeat(population, MOST_HALVINGS, axis=0)))
-            before, costs = self.cost(constants, residual, misfit), self.cost(shorter, tried, misfit)
-            better = np.flatnonzero(costs < before)
-            if not len(better):
-                break
-            constants = shorter[better[0]]
-            signals, slopes = self.linear(constants, population)
-            if before - costs[better[0]] < ARRIVED_START:
-                break
-        if not np.isfinite(slopes).all():
-            return piece
-        gain, offset = self.answer(constants, self.seen_slopes(slopes)[:, 0], misfit)
-        correction = StartCorrection(self.places, slopes[:, :, 0], gain * self.weights, offset, self.measured,
-                                     self.samples)  # fmt: skip
-        start = dict(zip(self.names, map(float, constants), strict=True))
-        return replace(piece.with_constants(start), correction=correction)
 
     def seen_slopes(self, slopes: Array) -> Array:
         shape = (len(slopes), slopes.shape[2], len(self.weights))

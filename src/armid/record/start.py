@@ -92,33 +92,6 @@ def state_shown(
     return dict(zip(names, map(float, start), strict=True)), dict(zip(names, map(float, deviations), strict=True))
 
 
-def outputs_at(plant: Plant, start: Mapping[str, float], constants: Mapping[str, float]) -> dict[str, float]:
-    """Return the outputs that start constants decide, at the first sample; constants: of the manoeuvre."""
-    visible = VisibleOutputs(plant, {n: v for n, v in constants.items() if n not in start})
-    states = visible.states(start)
-    return {o.name: visible.value(o.signal, states) for o in plant.outputs if visible.shows(o.signal)}
-
-
-def with_outputs_moved(
-    plant: Plant, start: Mapping[str, float], constants: Mapping[str, float], changes: Mapping[str, float]
-) -> dict[str, float]:  # fmt: skip
-    """Return start constants at which outputs are so much larger, by least squares; changes: output -> its unit."""
-    names, step = list(start), TINY * plant.scales.speed
-    seen = [name for name in outputs_at(plant, start, constants) if name in changes]
-    move = np.array([changes[name] for name in seen])
-    if not (move.any() and np.isfinite(move).all()):
-        return dict(start)
-
-    def at(values: Array) -> Array:
-        known = outputs_at(plant, dict(zip(names, map(float, values), strict=True)), constants)
-        return np.array([known[name] for name in seen])
-
-    here = np.array([start[name] for name in names])
-    slopes = np.array([at(here + step * one) - at(here - step * one) for one in np.eye(len(names))]).T / (2.0 * step)
-    moved = here + np.linalg.lstsq(slopes, move, rcond=1e-12)[0]
-    return dict(zip(names, map(float, moved), strict=True))
-
-
 def n_still(inputs: Sequence[Array]) -> int:
     """Return during how many first samples no input changes, or changes by no more than its noise."""
     if not inputs:
@@ -128,7 +101,10 @@ def n_still(inputs: Sequence[Array]) -> int:
 
 
 class VisibleOutputs:
-    """Evaluate those outputs of a plant, and how fast they change, that states and constants alone decide."""
+    """Evaluate those outputs of a plant, and how fast they change, that states and constants alone decide.
+
+    given: constants of the manoeuvre; a start replaces those of its name.
+    """
 
     def __init__(self, plant: Plant, given: Mapping[str, float]) -> None:
         self.graph, self.plant = Model(plant).graph, plant
@@ -160,6 +136,30 @@ class VisibleOutputs:
         rates = self.graph.values([f"rate__{n}" for n in moving], states)
         later, earlier = ({n: states[n] + side * TINY * rates[f"rate__{n}"] for n in moving} for side in (1.0, -1.0))
         return (self.value(key, {**states, **later}) - self.value(key, {**states, **earlier})) / (2.0 * TINY)
+
+    def at(self, start: Mapping[str, float]) -> dict[str, float]:
+        """Return the outputs at the first sample, output -> its unit; start: constant -> SI."""
+        states = self.states(start)
+        return {o.name: self.value(o.signal, states) for o in self.plant.outputs if self.shows(o.signal)}
+
+    def moved(self, start: Mapping[str, float], changes: Mapping[str, float]) -> dict[str, float]:
+        """Return the start at which outputs are larger by some changes, by least squares; changes: output -> its unit.
+
+        The start itself where nothing changes, or where a change is not finite.
+        """
+        names, step = list(start), TINY * self.plant.scales.speed
+        move = np.array(list(changes.values()))
+        if not (move.any() and np.isfinite(move).all()):
+            return dict(start)
+
+        def at(values: Array) -> Array:
+            known = self.at(dict(zip(names, map(float, values), strict=True)))
+            return np.array([known[name] for name in changes])
+
+        here = np.array(list(start.values()))
+        sides = [at(here + step * one) - at(here - step * one) for one in np.eye(len(names))]
+        moved = here + np.linalg.lstsq(np.array(sides).T / (2.0 * step), move, rcond=1e-12)[0]
+        return dict(zip(names, map(float, moved), strict=True))
 
 
 # A window of smoothing holds only what a polynomial of one of these degrees describes ...

@@ -16,8 +16,8 @@ from armid.inference.unknowns import Unknown, freed
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array
 
-# Fewest record files for a drift to be considered: with fewer a drift is a change in one record. Of two records nobody
-# can tell which of them is the other one.
+# Fewest record files for a drift to be considered: with fewer a drift is a change in one record. Of two records
+# either may be the other one.
 FEWEST_RECORDS, FEWEST_OTHERS = 4, 2
 # Its largest plausible size, as a share of the constant, of a parameter that keeps its sign, or of the range of one
 # that does not; prior deviations as shares of that.

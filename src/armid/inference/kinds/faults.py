@@ -22,7 +22,7 @@ from armid.model import Array, Model, Plant
 from armid.problem.problem import ReadyRecord, Replay, signals_of, with_each
 from armid.problem.starts import with_shown_starts
 from armid.record import Piece, Record
-from armid.record.start import outputs_at, with_outputs_moved
+from armid.record.start import VisibleOutputs
 
 # Faults whose size is fitted: largest plausible one, in seconds, in shares of the largest signal (a drift per second),
 # as a share, in radians or metres.
@@ -115,11 +115,12 @@ class Fault:
 
     def with_sound_start(self, piece: Piece, value: float, plant: Plant, output: str) -> Piece:
         """Return a piece whose start is what the sensor would have shown without its offset or gain."""
-        shown, known = piece.shown_start, piece.manoeuvre.constants
-        name = output or plant.outputs[0].name
-        read = outputs_at(plant, shown, known).get(name, 0.0)
-        change = -value if self.kind == "offset" else read / (1.0 + value) - read
-        return replace(piece, shown_start=with_outputs_moved(plant, shown, known, {name: change}))
+        outputs = VisibleOutputs(plant, piece.manoeuvre.constants)
+        shown, name = outputs.at(piece.shown_start), output or plant.outputs[0].name
+        if name not in shown:
+            return piece
+        change = -value if self.kind == "offset" else shown[name] / (1.0 + value) - shown[name]
+        return replace(piece, shown_start=outputs.moved(piece.shown_start, {name: change}))
 
     def measured(self, record: Record, value: float) -> Array:
         """Return what was measured without the fault, (n_samples,)."""
