@@ -30,6 +30,7 @@ ROOT = Path(__file__).parents[1]
 # of coverage, which makes them up to twice as long.
 NOT_TRACED = (
     "bench", "contract", "engine", "identifiers", "model", "problem", "studies", "test_golden_outputs.py",
+    "test_every_snippet_runs_and_every_output_is_true", "test_dask.py", "test_kills.py", "test_input_noise.py",
     "test_a_mistake_is_named", "test_a_right_campaign_is_not_accused", "test_right_campaigns_are_not_accused",
     "test_holdout_records_decide_nothing", "test_the_advised_record_tells_apart_and_beats_a_random_one",
     "test_finds_on_one_stroke_what_the_paper_found", "test_another_form_of_an_effect_takes_its_place",

@@ -37,6 +37,8 @@ from armid.model.effects.sensor import sensor_effects
 from armid.problem.space import Space
 from armid.record import Campaign
 
+# Returns the library with another noise, where an inference shows it, else the library as it is.
+ChangeOfNoise = Callable[[Library, "Inference"], Library]
 # By which factor strengths that scale with the machine may exceed their declared range.
 REACH_OF_STRENGTHS = 16.0
 # A declared effort within this factor of the largest one at the declared fit stays: a scale is an order of magnitude.
@@ -302,27 +304,20 @@ def infer(library: Library, declared: Fit) -> Inference:
 
     Each hypothesis (an effect, a fault of one record, a drift, a signal without a form) is a block of further unknowns
     with a prior, or a covariance. Models are explored in Occam's window; `evidence` says how one gets its probability.
-    All is repeated if inputs prove exact, noise in motion is another than at rest, or noise of inputs may be the rest.
+    All is repeated with another noise, each at most once, where the records are more probable so: `CHANGES_OF_NOISE`.
     """
-    inference = inferred(library, declared)
-    # First the inputs: those that are wrongly taken for noisy, or for exact, look like noise in motion.
-    exact = with_exact_inputs(library, inference)
-    is_exact, asked = exact is not library, inference
-    other = exact if is_exact else with_answering_inputs(library, inference)
-    if other is not library:
-        library, declared = other, declared_again(other, declared)
-        inference = inferred(library, declared)
-    shown = with_noise_in_motion(library, inference)
-    if shown is not library:
-        library, declared = shown, declared_again(shown, declared)
-        if not is_exact:
-            library, declared = with_input_noise(library, declared)
-        inference = inferred(library, declared)
-        exact = with_exact_inputs(library, inference)
-        if exact is not library:
-            return inferred(exact, declared_again(exact, declared))
-    other = library if is_exact or inference is asked else with_answering_inputs(library, inference)
-    return inference if other is library else inferred(other, declared_again(other, declared))
+    return inferred(library, declared, CHANGES_OF_NOISE)
+
+
+def inferred(library: Library, declared: Fit, changes: Sequence[ChangeOfNoise]) -> Inference:
+    """Return an inference, with the first of some changes of the noise that it asks for, and those after it."""
+    exploration = explore(library, declared)
+    inference = Inference(exploration, posterior(exploration))
+    for change in changes:
+        other = change(library, inference)
+        if other is not library:
+            return inferred(other, declared_again(other, declared), [c for c in changes if c is not change])
+    return inference
 
 
 def with_answering_inputs(library: Library, inference: Inference) -> Library:
@@ -392,11 +387,6 @@ def moved_and_left(library: Library, fit: Fit) -> list[tuple[NoiseModel, float]]
     """Return of each signal its noise and what a model leaves of it, rms [its unit]."""
     pairs = zip(library.data.levels, train_residuals(fit).raw, strict=True)
     return [(level, rms(left)) for level, left in pairs]
-
-
-def inferred(library: Library, declared: Fit) -> Inference:
-    exploration = explore(library, declared)
-    return Inference(exploration, posterior(exploration))
 
 
 def declared_again(library: Library, declared: Fit) -> Fit:
@@ -505,6 +495,10 @@ def with_measured_inputs(library: Library, fit: Fit) -> Library:
     with_noise = with_answers(data, fit.records.replays, fit.candidate, noise)
     records = tuple(estimated(r, noise) for r in data.records)
     return library.with_data(replace(with_noise, records=records), as_read=data)
+
+
+# In this order: inputs that are wrongly taken for noisy, or for exact, look like noise in motion.
+CHANGES_OF_NOISE: tuple[ChangeOfNoise, ...] = (with_exact_inputs, with_answering_inputs, with_noise_in_motion)
 
 
 def rescaled(library: Library, declared: Fit) -> Library:
