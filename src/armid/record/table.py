@@ -271,7 +271,8 @@ def input_columns(plant: Plant, named: Mapping[str, str], table: CsvTable, where
                 columns[wanted.name] = column
             elif wanted.required:
                 taken = {TIME_HEADER, *POSITIONS, *columns.values(), *(c for o in plant.outputs for c in o.factors)}
-                spare = [f"{wanted.name} = {quoted(h)} under [inputs] of campaign.toml"
+                unit = "" if wanted.unit in ("", "1") else f" (numbers in {wanted.unit})"
+                spare = [f"{wanted.name} = {quoted(h)}{unit} under [inputs] of campaign.toml"
                          for h in table.headers if h not in taken]  # fmt: skip
                 raise missing(table, f"column for input '{wanted.name}'", [*wanted.columns, *spare[:1]])
     return columns
