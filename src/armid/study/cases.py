@@ -357,8 +357,9 @@ class RunCache:
         case = self._once("case", shared | {"noise": level}, lambda: self._prepared(settings, level))
         if level == 0.0:
             return case, case.replays
-        noisy = [in_window(r, settings["window_s"]) for r in noisy_records(case.records, settings)]
-        return case, tuple(_measured_again(r, record) for r, record in zip(case.replays, noisy, strict=True))
+        # on the schedules of the records without noise: the manoeuvres are the same
+        noisy = (in_window(r, settings["window_s"]) for r in noisy_records(case.records, settings))
+        return case, tuple(r.changed(record=n.until_window_end()) for r, n in zip(case.replays, noisy, strict=True))
 
     def _prepared(self, settings: Mapping[str, Any], level: float) -> PreparedCase:
         if "suite" in settings:
@@ -401,9 +402,3 @@ class RunCache:
         if len(self._kept) > MOST_KEPT:
             del self._kept[next(iter(self._kept))]
         return self._kept[key]
-
-
-def _measured_again(replay: Replay, record: Record) -> Replay:
-    """Return a replay of the same manoeuvre with another measurement, on the schedule that it has."""
-    assert [p.window for p in replay.pieces] == [p.window for p in record.pieces]
-    return replay.changed(record=record.until_window_end())
