@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 from made_results import BOX, PAPER_CASES
 
-from armid.cli.new import python_file
+from armid.cli.new import filled
 from armid.contract.check import check_thing
 from armid.errors import ArmidError
 from armid.registry import load_registry
@@ -173,7 +173,7 @@ def test_the_answer_is_that_of_the_main_table(made):
 
 
 def test_the_starting_file_is_a_plug_in_that_becomes_a_section(made, tmp_path):
-    (tmp_path / "my_costs.py").write_text(python_file("analysis", "my_costs"), encoding="utf-8")
+    (tmp_path / "my_costs.py").write_text(filled("analysis.py.txt", name="my_costs"), encoding="utf-8")
     own = load_registry([f"{tmp_path / 'my_costs.py'}:my_costs"]).analyses
     with pytest.raises(ArmidError, match="'my_costs' has no contract: `armid report DIR"):
         list(check_thing("analyses", "my_costs", own["my_costs"]))
