@@ -11,6 +11,7 @@ from made_results import PAPER_CASES
 from armid.study.analyses.analysis import Evidence
 from armid.study.analyses.overview import answer_of, main_table
 from armid.study.analyses.ranks import RANKS, arrived, rank_tests, steps_of, suite_answer, tied
+from armid.study.document import report_of
 
 
 def on_the_same_noise(made, offsets, **more):
@@ -91,12 +92,14 @@ def test_a_study_that_was_cut_off_after_its_first_case_has_an_answer_and_ranks_n
     assert "arrive" not in text.text
 
 
-def test_the_answer_of_a_suite_says_who_cannot_be_told_from_the_best_and_where_the_own_stands(made):
+def test_the_report_of_a_suite_says_who_cannot_be_told_from_the_best_and_where_the_own_stands(made):
+    landscape = dict.fromkeys(("n_records", "noise_deg_s", "valley", "stair", "plateau", "minima", "holes"), 1.0)
     cases = [{**PAPER_CASES[i % 5], "name": f"p{i}", "suite": f"p{i}", "difficulty": "valley", "floor": 0.0,
-              "bounds": {key: [0, 1] for key in "abcd"}} for i in range(12)]  # fmt: skip
+              "landscape": landscape, "bounds": {key: [0, 1] for key in "abcd"}} for i in range(12)]  # fmt: skip
     results = made(cases=cases, noises=(0.0,), seeds=2, budget=400,
                    identifiers={"cmaes": 1e-5, "near": 1e-5, "mine": 1e-3, "pso": 1e-2})  # fmt: skip
     results.study |= {"budget_per_parameter": [100], "plugins": ["mine.py:mine"]}
+    results.runs["noise_deg_s"] = np.nan
     evidence = Evidence(results)
     (said,) = suite_answer(evidence)
     best, other = ("cmaes", "near") if "best is cmaes" in said else ("near", "cmaes")
@@ -105,5 +108,12 @@ def test_the_answer_of_a_suite_says_who_cannot_be_told_from_the_best_and_where_t
     assert "Your own mine is number 3 of " in said
     assert "The paper's swarm (pso) is number 4 of " in said
     assert "better than 0, worse than " in said.partition("The paper's swarm")[2]
+    # two identifiers do not tell whether the suite is easy
+    assert "too easy" not in said
     results.study["plugins"] = []
-    assert "Your own" not in suite_answer(Evidence(results))[0]
+    document = report_of(results)
+    assert "Your own" not in document.said[0]
+    assert evidence.settings == ["100 D"]
+    assert [s.title for s in document.sections][:2] == ["Ranks by class of difficulty", "At any time"]
+    assert document.main[0].frame["rank"].sum() == 1 + 2 + 3 + 4
+    assert document.sections[0].parts[2].frame["problem"].tolist() == [case["suite"] for case in cases]

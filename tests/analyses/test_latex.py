@@ -55,7 +55,6 @@ def test_table_1_is_laid_out_as_the_paper_prints_it(made):
     evidence = Evidence(made(seeds=3))
     part = paper_layout(evidence, "Table I", with_truth=True)
     rows = {(source, case): row for source, case, *row in part.frame.itertuples(index=False)}
-    assert np.round(rows["the paper", "row 3"], 5)[3:6].tolist() == [0.9, 0.8986, 0.00156]
     assert [round(100.0 * x, 3) for x in rows["the paper", "mean"][2::3]] == [0.487, 0.421, 0.171, 0.899]
     own = evidence.estimates.query("variant == 'pso' and setting == '0.3 deg/s' and case == 'row 2'")
     found = own[own["parameter"] == "eta3"]["value"].median()
