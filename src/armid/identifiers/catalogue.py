@@ -145,11 +145,8 @@ def of_phases(
         if dot and name in named:
             named[name][option] = value
         elif key not in own:
-            known = [
-                *own,
-                *(f"{n}.{each}" for n, phase in zip(names, phases, strict=True) for each in options_of(phase)),
-            ]
-            hint = [f"did you mean '{near}'?" for near in get_close_matches(key, known, n=1)]
+            of_phase = (f"{n}.{each}" for n, phase in zip(names, phases, strict=True) for each in options_of(phase))
+            hint = [f"did you mean '{near}'?" for near in get_close_matches(key, [*own, *of_phase], n=1)]
             hint += [f"those of a phase carry its name, {', '.join(f'{name}.OPTION' for name in named)}"]
             raise ArmidError(f"{whose} has no option '{key}', {hint[0]}")
     return tuple(

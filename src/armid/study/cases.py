@@ -129,12 +129,11 @@ def _case(
 
 
 def _space(
-    model: Model, overrides: Mapping[str, Override], spec: StudySpec, entry: CaseSpec | None, where: str
+    model: Model, overrides: Mapping[str, Override], spec: StudySpec, entry: CaseSpec, where: str
 ) -> Space:  # fmt: skip
     """Return bounds and fixed values; what the case fixes or frees holds against what the study says."""
-    own_bounds, own_fixed = (entry.bounds, entry.fixed) if entry else ({}, {})
-    fixed = {name: v for name, v in spec.fixed.items() if name not in own_bounds} | dict(own_fixed)
-    bounds = {name: b for name, b in spec.bounds.items() if name not in own_fixed} | dict(own_bounds)
+    fixed = {name: v for name, v in spec.fixed.items() if name not in entry.bounds} | dict(entry.fixed)
+    bounds = {name: b for name, b in spec.bounds.items() if name not in entry.fixed} | dict(entry.bounds)
     with located(where):
         return space_of(model, overrides, bounds, fixed)
 
@@ -265,7 +264,7 @@ def _random_cases(spec: StudySpec, model: Model, folder: Path, where: str) -> li
     wanted = validated(RandomCasesSpec, spec.random_cases, where)
     if wanted.margin >= 0.5:
         raise ArmidError(f"{where}: margin is {wanted.margin:g}, a share of the range from 0 to below 0.5 is expected")
-    space, n = _space(model, {}, spec, None, where), wanted.n
+    space, n = _space(model, {}, spec, CaseSpec(name="random"), where), wanted.n
     rng = np.random.default_rng(wanted.seed)
     low, high = space.low[space.free], space.high[space.free]
     parts = np.array([rng.permutation(n) for _ in low]).T
