@@ -3,6 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
+from made_results import made
 
 from armid.study.analyses.analysis import Evidence
 from armid.study.analyses.paper_tables import median_interval, spread, table1_rows, table2
@@ -10,7 +11,7 @@ from armid.study.analyses.paper_tables import median_interval, spread, table1_ro
 PAPERS_MEANS = [0.487, 0.421, 0.171, 0.899]
 
 
-def test_one_row_by_hand_and_the_last_four_are_means_beside_the_papers(made):
+def test_one_row_by_hand_and_the_last_four_are_means_beside_the_papers():
     evidence = Evidence(made(seeds=7))
     estimates = evidence.estimates
     rows = table1_rows(estimates, evidence.published)
