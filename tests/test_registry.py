@@ -116,7 +116,7 @@ def test_a_file_that_has_changed_is_run_again_and_what_it_imports_counts_as_its_
     digests = []
     for text in ("there = 1\n", "there = 2\n"):
         (tmp_path / "beside_that.py").write_text(text)
-        digests.append(study_registry([f"{tmp_path / 'whole.py'}:effect"]).digests["effects", "drag"])
+        digests.append(study_registry([f"{tmp_path / 'whole.py'}:effect"]).digests["effects drag"])
     assert digests[0] != digests[1]
 
 

@@ -1,7 +1,7 @@
 """The exceptions whose text is meant for the user, by cause, and how a wrong value is shown in their sentence."""
 
 import reprlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from difflib import get_close_matches
 
@@ -93,6 +93,12 @@ def nearest(word: str, known: Iterable[str]) -> str:
     if len(", ".join(words)) > LONGEST_LIST:
         return f"known: {', '.join(get_close_matches(word, words, n=3, cutoff=0.0))} and {len(words) - 3} more"
     return f"known: {', '.join(words)}" if words else "there is none"
+
+
+def refuse_unless_known(word: str, known: Collection[str], found: str) -> None:
+    """Raise ArmidError for a word that is not among the known ones; found: the sentence before the nearest of them."""
+    if word not in known:
+        raise ArmidError(f"{found}: {nearest(word, known)}")
 
 
 def nearest_registered(word: str, known: Iterable[str]) -> str:

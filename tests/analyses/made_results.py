@@ -50,7 +50,7 @@ def one_trace(run, truth, end, used, rng):
     return RunTrace(run, evaluations, np.minimum.accumulate(values), X, tuple(UNITS))
 
 
-def make(
+def made(
     cases=PAPER_CASES, identifiers=None,
     noises=(0.0, 0.3), seeds=5, fitness=("similarity",),
     windows=("0-0.7 s",), failed=0, budget=3000, report="",

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from made_results import made
 
 from armid.study.analyses.analysis import (
     TARGETS,
@@ -18,7 +19,7 @@ from armid.study.analyses.analysis import (
 from armid.study.analyses.convergence import SUCCESS_TOLERANCES
 
 
-def test_labels_and_settings_tell_what_differs(made):
+def test_labels_and_settings_tell_what_differs():
     one, two = made(seeds=1), made(seeds=1, fitness=("rmse", "similarity"))
     assert set(outcomes(one.runs, one.parameters)["variant"]) == {"pso", "cmaes", "de+bobyqa"}
     assert "pso on rmse" in set(outcomes(two.runs, two.parameters)["variant"])
@@ -29,7 +30,7 @@ def test_labels_and_settings_tell_what_differs(made):
     assert set(own["setting"]) == {"as recorded"}
 
 
-def test_largest_error_is_of_known_truths_and_infinite_for_a_failed_run(made):
+def test_largest_error_is_of_known_truths_and_infinite_for_a_failed_run():
     results = made(seeds=1, failed=2)
     runs = outcomes(results.runs, results.parameters)
     assert np.isinf(runs["largest_error"].iloc[-2:]).all()
@@ -43,14 +44,14 @@ def test_largest_error_is_of_known_truths_and_infinite_for_a_failed_run(made):
     assert unknown.iloc[:-2].isna().all()
 
 
-def test_the_papers_swarm_and_the_best_of_the_others_are_of_interest(made):
+def test_the_papers_swarm_and_the_best_of_the_others_are_of_interest():
     identifiers = {"pso, x": 1e-2, "pso+bobyqa": 1e-5, "a": 1e-1, "b": 1e-4, "c": 1e-3}
     evidence = Evidence(made(seeds=3, noises=(0.0,), identifiers=identifiers))
     assert evidence.interesting == ["pso, x", "pso+bobyqa", "b", "c"]
     assert evidence.best_first == ["pso+bobyqa", "b", "c", "pso, x", "a"]
 
 
-def test_an_analysis_of_a_user_gets_the_columns_that_the_docstring_shows(made):
+def test_an_analysis_of_a_user_gets_the_columns_that_the_docstring_shows():
     results = made(seeds=1, failed=1)
     wide, listed = wide_runs(Evidence(results)), str(wide_runs.__doc__).split("=\n")[1]
     shown = {name for line in listed.splitlines() for name in line.strip().partition("  ")[0].split(", ")}
@@ -91,7 +92,7 @@ def test_the_tolerances_of_the_success_rates_are_targets_and_a_share_is_that_of_
     assert remaining_share(np.array([2.0]), np.nan, 1.0).tolist() == [np.inf]
 
 
-def test_hits_and_held_values_of_each_run_of_the_best_and_without_those_that_came_in_later(made):
+def test_hits_and_held_values_of_each_run_of_the_best_and_without_those_that_came_in_later():
     results = made(seeds=2, failed=1)
     runs = outcomes(results.runs, results.parameters)
     truths = {case["name"]: case["truth"] for case in results.study["cases"]}

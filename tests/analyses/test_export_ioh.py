@@ -6,13 +6,14 @@ import warnings
 import iohinspector
 import numpy as np
 import pytest
+from made_results import made
 
 from armid.study.export import WORST_VALUE, export_ioh, instance_numbers, lines
 from armid.study.store import RunTrace
 
 
 @pytest.fixture(scope="module")
-def exported(made, tmp_path_factory):
+def exported(tmp_path_factory):
     folder = tmp_path_factory.mktemp("ioh")
     results = made(seeds=3, failed=2)
 
@@ -52,7 +53,7 @@ def test_every_run_that_ended_well_is_there_and_every_improvement_comes_back_bit
     assert own[["x0", "x1", "x2", "x3"]].to_numpy().tolist() == trace.X.tolist()
 
 
-def test_a_failed_first_candidate_and_an_early_end_are_logged_and_large_seeds_become_places(made, tmp_path):
+def test_a_failed_first_candidate_and_an_early_end_are_logged_and_large_seeds_become_places(tmp_path):
     trace = RunTrace("r", np.array([3]), np.array([0.5]), np.array([[1.0]]), ("k",))
     assert list(lines(trace, 7)) == [f"1 {WORST_VALUE!r} nan\n", "3 0.5 1.0\n", "7 0.5 1.0\n"]
     assert list(lines(trace, 3)) == [f"1 {WORST_VALUE!r} nan\n", "3 0.5 1.0\n"]

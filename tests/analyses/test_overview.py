@@ -4,9 +4,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
-from made_results import PAPER_CASES, MadeResults
+from made_results import PAPER_CASES, MadeResults, made
 
-from armid.report.files import markdown
 from armid.study.analyses.analysis import Evidence
 from armid.study.analyses.convergence import success
 from armid.study.analyses.errors import (
@@ -19,14 +18,10 @@ from armid.study.analyses.errors import (
 )
 from armid.study.analyses.overview import loop_runs, main_table, reasons, runs_table
 from armid.study.document import report_of, summary_of
-from armid.study.results import load_study
-from armid.study.runner import run_study
-from armid.study.tasks import read_study
 from armid.units import angles_in
-from input_texts import TABLE_STUDY
 
 
-def test_the_overview_begins_with_the_paper(made):
+def test_the_overview_begins_with_the_paper():
     evidence = Evidence(made(report="table1"))
     frame, estimates = main_table(evidence).frame, evidence.estimates
     assert frame.iloc[0]["variant"] == "the paper's pso"
@@ -38,7 +33,7 @@ def test_the_overview_begins_with_the_paper(made):
     assert row["largest_worst"] == own["relative_error"].max()
 
 
-def test_without_truths_there_are_medians_of_the_values_in_units_that_people_read(made):
+def test_without_truths_there_are_medians_of_the_values_in_units_that_people_read():
     evidence = Evidence(made(seeds=2))
     evidence.parameters = evidence.parameters.assign(truth=np.nan)
     table = main_table(evidence)
@@ -53,7 +48,7 @@ def test_without_truths_there_are_medians_of_the_values_in_units_that_people_rea
 
 
 @pytest.mark.parametrize(("angle", "label", "factor"), [("deg", "deg/s", 180.0 / np.pi), ("rad", "rad/s", 1.0)])
-def test_a_study_shows_its_fitness_in_the_unit_of_its_records(made, angle, label, factor):
+def test_a_study_shows_its_fitness_in_the_unit_of_its_records(angle, label, factor):
     results = made(seeds=1, noises=(0.0,), fitness=("rmse",))
     results.parameters["truth"] = np.nan
     results.study |= {"angle": angle, "unit": "rad/s"}
@@ -70,7 +65,7 @@ def outcomes_with(errors):
     return pd.DataFrame({"setting": "noise-free", "variant": "pso", "largest_error": errors})
 
 
-def test_success_at_the_tolerance_with_its_interval_and_runs_are_counted_with_their_failures(made):
+def test_success_at_the_tolerance_with_its_interval_and_runs_are_counted_with_their_failures():
     row = success(outcomes_with([1e-2, 0.0099, 0.02, np.inf, np.nan])).frame.iloc[0]
     assert (row["n"], row["within_1_percent_successes"], row["within_0.1_percent_successes"]) == (4, 2, 0)
     assert (row["within_1_percent_rate"], row["within_0.1_percent_rate"]) == (0.5, 0.0)
@@ -84,7 +79,7 @@ def test_success_at_the_tolerance_with_its_interval_and_runs_are_counted_with_th
     assert found == {"budget used": 13, "failed: it broke": 2}
 
 
-def test_the_error_map_has_medians_in_the_orders_given_and_deviations_are_in_percent(made):
+def test_the_error_map_has_medians_in_the_orders_given_and_deviations_are_in_percent():
     evidence = Evidence(made(seeds=2))
     runs = evidence.of("noise-free")
     errors = error_map(runs, ["de+bobyqa", "pso", "unknown"], ["row 2", "row 1"])
@@ -104,7 +99,7 @@ def test_the_error_map_has_medians_in_the_orders_given_and_deviations_are_in_per
     assert list(end_points(renamed).columns[2:]) == ["mass", "k", "coulomb.level", "n"]
 
 
-def test_a_plug_in_has_the_first_colour_and_every_fitness_a_strip(made):
+def test_a_plug_in_has_the_first_colour_and_every_fitness_a_strip():
     found = made(seeds=2, fitness=("similarity", "likelihood"))
     found.study["plugins"] = ["mine.py:cmaes"]
     evidence = Evidence(found)
@@ -167,28 +162,13 @@ def test_closed_loops_have_a_row_each_and_a_report_that_counts_verdicts(tmp_path
     assert report_of(failed).answer[0] == "No campaign was closed."
 
 
-def test_each_budget_is_run_by_itself(tmp_path):
-    text = TABLE_STUDY.replace("seeds = 2", "seeds = 1")
-    line = next(line for line in text.splitlines() if line.startswith("budget = "))
-    (tmp_path / "tiny.toml").write_text(text.replace(line, "budget = [40, 90]"), encoding="utf-8")
-    study = read_study(tmp_path / "tiny.toml")
-    assert [entry.budgets(4) for entry in study.entries] == [[40, 90]] * len(study.entries)
-    run_study(tmp_path / "tiny.toml", jobs=1, out=tmp_path / "out")
-    runs = load_study(tmp_path / "out").runs
-    assert (runs["used"] <= runs["budget"]).all()
-    assert runs.groupby("identifier")["budget"].apply(sorted).map(tuple).unique().tolist() == [(40, 90)]
-    text = markdown(report_of(load_study(tmp_path / "out")))
-    assert "| budget |" in text.replace("**", "")
-    assert ", 40 simulations: " in text
-
-
 def columns_of(results):
     evidence = Evidence(results)
     table = evidence.apart(main_table(evidence))
     return evidence, [c.header for c in table.columns if c.key.startswith("setting")], table.frame
 
 
-def test_noise_window_and_budget_have_columns_of_their_own_as_far_as_they_differ(made):
+def test_noise_window_and_budget_have_columns_of_their_own_as_far_as_they_differ():
     results = made(cases=PAPER_CASES[:2], noises=(0.0, 0.3), windows=("0-0.7 s", "whole"), seeds=2)
     _, headers, frame = columns_of(results)
     assert headers == ["noise", "window"]

@@ -10,9 +10,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 import pytest
-from made_results import BOX, PAPER_CASES
+from made_results import BOX, PAPER_CASES, made
 
-from armid.cli.new import python_file
+from armid.cli.new import filled
 from armid.contract.check import check_thing
 from armid.errors import ArmidError
 from armid.registry import load_registry
@@ -30,15 +30,15 @@ def written(results, folder):
     return names
 
 
-def small(make):
+def small():
     identifiers = {"pso": 3e-3, "pso+bobyqa": 1e-6}
-    return make(report="table1", failed=2, seeds=2, noises=(0.0,), identifiers=identifiers)
+    return made(report="table1", failed=2, seeds=2, noises=(0.0,), identifiers=identifiers)
 
 
 @pytest.fixture(scope="module")
-def table1_report(made, tmp_path_factory):
+def table1_report(tmp_path_factory):
     folder = tmp_path_factory.mktemp("report")
-    return folder, written(small(made), folder)
+    return folder, written(small(), folder)
 
 
 def drawn(results):
@@ -77,8 +77,8 @@ def test_the_page_has_every_file_table_and_figure_and_tells_what_it_is_made_of(t
 def test_same_results_give_the_same_bytes_in_another_process_and_order(table1_report, tmp_path):
     """Neither hash seeds nor the order in which two runners have finished the runs enter."""
     code = (
-        "import sys; sys.path[:0] = sys.argv[1:3]; import test_study_document as test, made_results\n"
-        "results = test.small(made_results.make)\n"
+        "import sys; sys.path[:0] = sys.argv[1:3]; import test_study_document as test\n"
+        "results = test.small()\n"
         "mixed = test.replace(results, runs=results.runs.sample(frac=1.0, random_state=3), kept=results.kept[::-1])\n"
         "test.written(mixed, test.Path(sys.argv[3]))"
     )
@@ -91,7 +91,7 @@ def test_same_results_give_the_same_bytes_in_another_process_and_order(table1_re
         assert (folder / name).read_bytes() == (tmp_path / "out" / name).read_bytes(), name
 
 
-def test_a_study_that_is_not_complete_says_so_first_and_what_cannot_be_reported_is_refused(made, tmp_path):
+def test_a_study_that_is_not_complete_says_so_first_and_what_cannot_be_reported_is_refused(tmp_path):
     results = made(seeds=1)
     document = report_of(replace(results, study=results.study | {"n_planned": 500}))
     assert document.warning == "NOT COMPLETE: 30 of 500 runs have ended; every number below is of these."
@@ -110,11 +110,11 @@ def test_a_study_that_is_not_complete_says_so_first_and_what_cannot_be_reported_
      {"fitness", "convergence_rmse"}),
     ({"noises": (0.3,), "windows": ("0-0.7 s", "whole"), "report": "table2"}, {"table2", "table_ii_as_printed"}),
 ])  # fmt: skip
-def test_studies_of_other_shapes(made, change, there):
+def test_studies_of_other_shapes(change, there):
     assert there <= drawn(made(cases=PAPER_CASES[:2], seeds=1, **change))
 
 
-def test_all_runs_failed_and_names_of_a_file_make_names_of_files(made, tmp_path):
+def test_all_runs_failed_and_names_of_a_file_make_names_of_files(tmp_path):
     results = made(seeds=1, noises=(0.0,), failed=15)
     assert report_of(results).answer[0] == "No run has a result."
     names = written(results, tmp_path / "out")
@@ -126,7 +126,7 @@ def test_all_runs_failed_and_names_of_a_file_make_names_of_files(made, tmp_path)
     assert all(re.fullmatch(r"[a-z0-9_]+", n) for n in names)
 
 
-def test_without_a_truth_there_are_values_and_costs_and_no_errors(made):
+def test_without_a_truth_there_are_values_and_costs_and_no_errors():
     results = made(cases=PAPER_CASES[:2], seeds=2)
     results.study["cases"] = [c | {"truth": {}, "campaign": "campaigns/mine"} for c in results.study["cases"]]
     results.parameters[["truth", "relative_error"]] = np.nan
@@ -141,7 +141,7 @@ def test_without_a_truth_there_are_values_and_costs_and_no_errors(made):
     )
 
 
-def test_twenty_cases_have_critical_differences_and_realisations_of_noise_their_bound(made):
+def test_twenty_cases_have_critical_differences_and_realisations_of_noise_their_bound():
     rng = np.random.default_rng(7)
     many_cases = [{"name": f"case {i}", "truth": {n: rng.uniform(*box) for n, box in BOX.items()}} for i in range(24)]
     many = report_of(made(cases=many_cases, seeds=1, noises=(0.0,)))
@@ -155,7 +155,7 @@ def test_twenty_cases_have_critical_differences_and_realisations_of_noise_their_
     assert "cramer_rao" not in [t.name for t in report_of(recorded).tables]
 
 
-def test_the_answer_is_that_of_the_main_table(made):
+def test_the_answer_is_that_of_the_main_table():
     document = report_of(made(report="table1", seeds=3, noises=(0.0, 0.3)))
     table = document.main[0].frame
     for setting in ("noise-free", "0.3 deg/s"):
@@ -172,8 +172,8 @@ def test_the_answer_is_that_of_the_main_table(made):
     )
 
 
-def test_the_starting_file_is_a_plug_in_that_becomes_a_section(made, tmp_path):
-    (tmp_path / "my_costs.py").write_text(python_file("analysis", "my_costs"), encoding="utf-8")
+def test_the_starting_file_is_a_plug_in_that_becomes_a_section(tmp_path):
+    (tmp_path / "my_costs.py").write_text(filled("analysis.py.txt", name="my_costs"), encoding="utf-8")
     own = load_registry([f"{tmp_path / 'my_costs.py'}:my_costs"]).analyses
     with pytest.raises(ArmidError, match="'my_costs' has no contract: `armid report DIR"):
         list(check_thing("analyses", "my_costs", own["my_costs"]))
@@ -200,7 +200,7 @@ def test_tables_and_figures_in_any_form():
             parts_of("mine", broken)
 
 
-def test_missing_cells_are_empty_names_of_files_differ_and_names_of_ours_are_taken(made):
+def test_missing_cells_are_empty_names_of_files_differ_and_names_of_ours_are_taken():
     frame = pd.DataFrame({"n": [1, None], "label": ["a", None]}).convert_dtypes()
     (section,) = own_sections({"mine": lambda runs: frame}, pd.DataFrame())
     assert [[c.text for c in row] for row in section.parts[0].cells()] == [["1", "a"], ["", ""]]

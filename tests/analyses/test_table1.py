@@ -3,17 +3,18 @@
 import numpy as np
 import pandas as pd
 import pytest
-from made_results import PAPER_CASES
+from made_results import made
 
-from armid.study.analyses.analysis import Evidence, published_values
+from armid.study.analyses.analysis import Evidence
 from armid.study.analyses.paper_tables import median_interval, spread, table1_rows, table2
 
 PAPERS_MEANS = [0.487, 0.421, 0.171, 0.899]
 
 
-def test_one_row_by_hand_and_the_last_four_are_means_beside_the_papers(made):
-    estimates = Evidence(made(seeds=7)).estimates
-    rows = table1_rows(estimates, published_values({"cases": PAPER_CASES}))
+def test_one_row_by_hand_and_the_last_four_are_means_beside_the_papers():
+    evidence = Evidence(made(seeds=7))
+    estimates = evidence.estimates
+    rows = table1_rows(estimates, evidence.published)
     key = {"setting": "0.3 deg/s", "variant": "pso", "case": "row 3", "parameter": "n"}
     own = estimates[np.all([estimates[k] == v for k, v in key.items()], axis=0)]
     row = rows[np.all([rows[k] == v for k, v in key.items()], axis=0)].iloc[0]

@@ -1,6 +1,11 @@
 """A small study of the arm, identifiers that misbehave, and when two stores hold the same."""
 
 import re
+import sqlite3
+import time
+from contextlib import closing
+
+from armid.study.store import FILE_NAME
 
 # What a runner says beside its output before it opens anything, and where nothing was compiled before.
 COST = re.compile(
@@ -119,6 +124,24 @@ def same_results(one, two):
     runs = one.runs.drop(columns=NOT_COMPARED).equals(two.runs.drop(columns=NOT_COMPARED))
     parameters, traces = one.parameters.equals(two.parameters), one.traces.equals(two.traces)
     return runs and parameters and traces
+
+
+def n_kept(out):
+    """How many runs the store of a folder holds."""
+    try:
+        with closing(sqlite3.connect(f"file:{out / FILE_NAME}?mode=ro", uri=True)) as connection:
+            return connection.execute("SELECT count(*) FROM runs").fetchone()[0]
+    except sqlite3.OperationalError:
+        # neither file nor tables may be made yet
+        return 0
+
+
+def wait_for(process, out, more_than=0):
+    """Wait until a store holds more runs, or the process has ended."""
+    end = time.monotonic() + 600.0
+    while n_kept(out) <= more_than and process.poll() is None:
+        assert time.monotonic() < end
+        time.sleep(0.01)
 
 
 def beside_cost(err):

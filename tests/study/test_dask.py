@@ -7,7 +7,7 @@ import sys
 import time
 
 import pytest
-from small_study import same_results
+from small_study import n_kept, same_results, wait_for
 
 from armid.errors import ArmidError
 from armid.study.results import load_study
@@ -49,23 +49,12 @@ def test_a_dask_cluster_that_loses_a_worker(cluster, start, write_study, tmp_pat
     address, workers = cluster
     out = tmp_path / "out"
     process = start(write_study(SEEDS), "--out", out, "--dask", address)
-    end = time.monotonic() + 600.0
-    while not (out / "study.sqlite").exists() or not n_runs(out):
-        assert process.poll() is None, process.communicate()
-        assert time.monotonic() < end
-        time.sleep(0.05)
-    assert n_runs(out) < len(undisturbed.runs)
+    wait_for(process, out)
+    assert 0 < n_kept(out) < len(undisturbed.runs), process.communicate()
     workers[0].kill()
     _, err = process.communicate(timeout=600)
     assert process.returncode == 0, err
     assert same_results(load_study(out), undisturbed)
-
-
-def n_runs(out):
-    try:
-        return len(load_study(out).runs)
-    except ArmidError:
-        return 0
 
 
 def test_a_cluster_that_is_not_there_or_goes_while_runs_are_made(write_study, tmp_path, monkeypatch):

@@ -10,7 +10,7 @@ import time
 from contextlib import closing, suppress
 
 import pytest
-from small_study import RUNS_A_SEED, beside_cost, same_results
+from small_study import RUNS_A_SEED, beside_cost, n_kept, same_results, wait_for
 
 from armid.study.results import load_study
 from armid.study.runner import run_study
@@ -24,21 +24,11 @@ UNMEASURED = {name: value for name, value in os.environ.items() if not name.star
 
 def kept(out):
     """Run -> everything that the store holds of it."""
-    try:
-        with closing(sqlite3.connect(f"file:{out / FILE_NAME}?mode=ro", uri=True)) as connection:
-            rows = connection.execute("SELECT r.*, t.trace FROM runs r JOIN traces t USING (run)").fetchall()
-            return {row[0]: row for row in rows}
-    except sqlite3.OperationalError:
-        # neither file nor tables may be made yet
+    if not n_kept(out):
         return {}
-
-
-def wait_for(process, out, more_than, seconds=600.0):
-    """Wait until a store holds more runs, or the process has ended."""
-    end = time.monotonic() + seconds
-    while len(kept(out)) <= more_than and process.poll() is None:
-        assert time.monotonic() < end
-        time.sleep(0.01)
+    with closing(sqlite3.connect(f"file:{out / FILE_NAME}?mode=ro", uri=True)) as connection:
+        rows = connection.execute("SELECT r.*, t.trace FROM runs r JOIN traces t USING (run)").fetchall()
+        return {row[0]: row for row in rows}
 
 
 def ended_well(process):
@@ -48,10 +38,11 @@ def ended_well(process):
     return out
 
 
-def killed_again_and_again(start, file, out, moments, rng):
-    """Kill a runner at random moments, then let it end; return how often it was really killed in the middle."""
-    cut = 0
-    for _ in range(moments):
+@pytest.mark.slow
+def test_a_runner_killed_again_and_again(start, write_study, tmp_path, undisturbed):
+    """After many kills nearly every run is finished, and none hits a runner at work."""
+    file, out, rng, cut = write_study(SEEDS), tmp_path / "out", random.Random(2), 0
+    for _ in range(3):
         before = kept(out)
         process = start(file, "--out", out, "--jobs", rng.choice((1, 2)), env=UNMEASURED)
         if rng.random() < 0.8:
@@ -65,15 +56,9 @@ def killed_again_and_again(start, file, out, moments, rng):
         cut += process.wait() == -signal.SIGKILL
         after = kept(out)
         assert {run: after[run] for run in before} == before
+    assert cut >= 2
     assert f"{N_RUNS} of {N_RUNS} are in" in ended_well(start(file, "--out", out, "--jobs", 2))
-    return cut
-
-
-@pytest.mark.slow
-def test_a_runner_killed_again_and_again(start, write_study, tmp_path, undisturbed):
-    """After many kills nearly every run is finished, and none hits a runner at work."""
-    assert killed_again_and_again(start, write_study(SEEDS), tmp_path / "out", 3, random.Random(2)) >= 2
-    assert same_results(load_study(tmp_path / "out"), undisturbed)
+    assert same_results(load_study(out), undisturbed)
 
 
 def stat_of(pid):
@@ -95,7 +80,7 @@ def test_workers_may_be_killed_and_end_with_their_runner(start, write_study, tmp
     process = start(write_study(SEEDS), "--out", tmp_path / "out", "--jobs", 2)
     wait_for(process, tmp_path / "out", 2)
     os.kill(children_of(process.pid)[0], signal.SIGKILL)
-    wait_for(process, tmp_path / "out", len(kept(tmp_path / "out")) + 2)
+    wait_for(process, tmp_path / "out", n_kept(tmp_path / "out") + 2)
     workers = children_of(process.pid)
     process.kill()
     process.wait()

@@ -4,14 +4,12 @@ import json
 import os
 import shutil
 import signal
-import sqlite3
-import time
-from contextlib import closing
 from pathlib import Path
 
 import pandas as pd
 import pytest
 from loop_suite import STUDY, SUITE
+from small_study import n_kept, wait_for
 
 from armid.study.results import load_study
 from armid.study.runner import run_study
@@ -55,24 +53,13 @@ def test_every_report_is_kept_whole_and_the_score_of_store_and_exported_reports_
         assert set(pd.read_csv(tmp_path / "score" / "campaigns.csv")["judgement"]) == {"right"}
 
 
-def n_kept(out):
-    try:
-        with closing(sqlite3.connect(f"file:{out / 'study.sqlite'}?mode=ro", uri=True)) as connection:
-            return connection.execute("SELECT count(*) FROM loops").fetchone()[0]
-    except sqlite3.OperationalError:
-        return 0
-
-
 def test_a_kill_loses_nothing_and_the_loop_never_opens_the_key(start, closed, suite, tmp_path):
     """A pipe where the key should be blocks for ever who opens it."""
     without_key = shutil.copytree(suite, tmp_path / "copy", ignore=shutil.ignore_patterns("out", "suite.key.json"))
     os.mkfifo(without_key / "suite.key.json")
     out = without_key / "out"
     process = start(without_key / "blind.toml", "--out", out, "--jobs", 1)
-    end = time.monotonic() + 600.0
-    while not n_kept(out) and process.poll() is None:
-        assert time.monotonic() < end
-        time.sleep(0.02)
+    wait_for(process, out)
     process.kill()
     assert process.wait() == -signal.SIGKILL
     before = n_kept(out)

@@ -44,7 +44,7 @@ def test_other_records_and_other_candidates_are_other_runs(write, tmp_path):
 
 def test_another_plant_of_the_user_makes_other_runs_and_is_not_mistaken_for_the_first(write):
     def registry(digest):
-        return StudyRegistry(digests={("plants", "boom"): digest, ("fitness", "mine"): digest})
+        return StudyRegistry(digests={"plants boom": digest, "fitness mine": digest})
 
     study, runs = read_study(write()), []
     for digest in "12":

@@ -39,6 +39,8 @@ def test_every_combination_is_there_once_and_random_truths_are_a_latin_hypercube
     assert [p.seed for p in planned] == sorted(p.seed for p in planned)
     words = {(p.case, p.identifier, p.fitness, p.noise_deg_s, p.seed) for p in planned}
     assert len(words) == len(planned)
+    budgets = [p.budget for p in read_study(write_study(3, change=("budget = 40", "budget = [40, 90]"))).plan()]
+    assert (budgets.count(40), budgets.count(90)) == (len(planned), len(planned))
     random_cases = RANDOM + FIRST_CASE
     cases = read_study(write_study(1, change=(FIRST_CASE, random_cases))).cases[2:]
     assert [c.name for c in cases[:2]] == ["random 01", "random 02"]

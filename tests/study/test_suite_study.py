@@ -15,11 +15,8 @@ from armid.problem.meter import Meter
 from armid.problem.problem import IdentificationProblem
 from armid.registry import load_registry
 from armid.report.style import pyplot
-from armid.study.analyses.analysis import TARGETS, Evidence, first_hits, remaining_share
+from armid.study.analyses.analysis import TARGETS, first_hits, remaining_share
 from armid.study.analyses.convergence import area_over_curve, attained
-from armid.study.document import report_of
-from armid.study.results import load_study
-from armid.study.runner import run_study
 from armid.study.store import Store
 from armid.study.tasks import read_study
 from armid.study.tune import RANGES, Tuned, proposed, training, tune, tuned_document, tuned_study
@@ -86,26 +83,11 @@ def test_what_cannot_be_is_refused(written, replaced, sentence):
         read_study(written(**replaced))
 
 
-@pytest.mark.slow
-def test_a_report_in_words(written, tmp_path):
-    file = written(**{"instances = [1, 2]": "instances = [1]", "seeds = 2": "seeds = 1"})
-    results = run_study(file, jobs=1, out=tmp_path / "out")
-    assert set(results.runs["status"]) == {"done"}
-    evidence = Evidence(load_study(tmp_path / "out"))
-    assert evidence.settings == ["5 D", "30 D"]
-    document = report_of(results)
-    assert [s.title for s in document.sections][:2] == ["Ranks by class of difficulty", "At any time"]
-    first, second = document.said[:2]
-    assert first.startswith("Budget 5 D, 3 cases: best is ")
-    assert "The paper's swarm (pso) is number" in second
-    assert not any("too easy" in sentence for sentence in document.said)  # two identifiers do not tell
-    # by hand: the mean rank is that of the medians over the seeds
-    table = document.main[0].frame
-    assert table.groupby("setting")["rank"].sum().tolist() == [3.0, 3.0]
-    problems = document.sections[0].parts[2].frame
-    assert problems["problem"].tolist() == ["arm", "arm_shape", "arm_short"]
-    assert problems["class"].tolist() == ["smooth", "stair", "valley"]
-    assert len(results.runs) == 12
+def test_what_a_report_needs_of_an_instance_is_that_of_the_first_of_its_problem(written):
+    cases = read_study(written()).description()["cases"]
+    told = {case["suite"]: case["difficulty"] for case in cases}
+    assert told == {"arm": "smooth", "arm_shape": "stair", "arm_short": "valley"}
+    assert [case["landscape"] for case in cases[::2]] == [case["landscape"] for case in cases[1::2]]
 
 
 def test_the_area_over_the_curve_by_hand_and_where_curves_end():

@@ -29,7 +29,7 @@ from armid.cli.options import (
     value_of,
 )
 from armid.cli.report import show_and_save
-from armid.errors import INTERRUPTED, ArmidError, nearest
+from armid.errors import INTERRUPTED, ArmidError, refuse_unless_known
 from armid.progress import status_line
 from armid.report.result import IDENTIFIABILITY, IDENTIFICATION, LOOP, refuse_unwritable
 
@@ -175,8 +175,7 @@ def identifiability_command(
     from armid.api import examine
     from armid.estimation.examine import LEAST_EXAMINED, RANKINGS
 
-    if rank not in RANKINGS:
-        raise ArmidError(f"--rank '{rank}': {nearest(rank, RANKINGS)}")
+    refuse_unless_known(rank, RANKINGS, f"--rank '{rank}'")
     if noise is not None and not LEAST_EXAMINED <= noise <= 1.0 / LEAST_EXAMINED:
         expected = f"a finite number above 0 is expected, {LEAST_EXAMINED:g} to {1.0 / LEAST_EXAMINED:g}"
         raise ArmidError(f"--noise is {noise:g}, {expected}")

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import click
 
 from armid.cli.options import command, completes, examples, give, of_studies, plugin_option, say
-from armid.errors import ArmidError, nearest
+from armid.errors import ArmidError, refuse_unless_known
 from armid.registry import Registry, load_plugin, load_registry
 
 if TYPE_CHECKING:
@@ -49,8 +49,7 @@ def check_command(thing: str, on: str | None, time_limit: float, plugins: tuple[
         raise ArmidError(f"--time-limit is {time_limit:g}, a number of seconds above 0 is expected")
     registry = load_registry(plugins)
     if on is not None:
-        if on not in registry.plants:
-            raise ArmidError(f"--on '{on}' is not a plant: {nearest(on, registry.plants)}")
+        refuse_unless_known(on, registry.plants, f"--on '{on}' is not a plant")
         registry.plants = {on: registry.plants[on]}
     kind, name, points = points_of(thing, registry)
     tell_points(f"{kind}: {name}", limited(points, time_limit), kind=kind, name=name)

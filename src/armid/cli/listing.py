@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from armid.cli.options import command, completes, examples, give, plugin_option, present, put, say, wants
-from armid.errors import ArmidError, nearest, quoted
+from armid.errors import quoted, refuse_unless_known
 from armid.model import Effect, Parameter, Plant, refusal_of
 from armid.model.effects.sensor import sensor_effects
 from armid.model.graph import returned_text
@@ -44,15 +44,13 @@ def list_command(what: str, names: tuple[str, ...], is_long: bool, plugins: tupl
     --long adds equations, and of identifiers the name, default, unit and meaning of each option. analyses: sections of
     the report of a study.
     """
-    if what not in KINDS:
-        raise ArmidError(f"list '{what}' is not known: {nearest(what, KINDS)}")
+    refuse_unless_known(what, KINDS, f"list '{what}' is not known")
     registry = load_registry(plugins)
     catalogue = things_of(what, registry)
     if what == "effects" and names:
         catalogue = {n: e for plant in registry.plants.values() for n, e in sensor_effects(plant).items()} | catalogue
     for name in names:
-        if name not in catalogue:
-            raise ArmidError(f"{what}: '{name}' is not known: {nearest(name, catalogue)}")
+        refuse_unless_known(name, catalogue, f"{what}: '{name}' is not known")
     things = {name: catalogue[name] for name in names or catalogue}
     if wants("quiet"):
         put(*things)
@@ -111,9 +109,9 @@ def entry(thing: Any) -> dict[str, Any]:
         fields["ports"] = dict(ports)
     if hasattr(thing, "build"):
         from armid.identifiers import options_of
+        from armid.identifiers.identifier import TRAITS
 
-        flags = ("is_global", "uses_gradient", "is_stochastic", "needs_residuals")
-        fields |= {flag: getattr(thing, flag) for flag in flags} | {"options": options_of(thing)}
+        fields |= {flag: getattr(thing, flag) for flag in TRAITS} | {"options": options_of(thing)}
     return fields | ({"unit": thing.unit, "join": thing.join} if hasattr(thing, "join") else {})
 
 

@@ -18,8 +18,9 @@ from tokenize import generate_tokens
 import click
 import numpy as np
 
+from armid.cli.listing import things_of
 from armid.cli.options import command, completes, examples, give, plugin_option, say
-from armid.errors import ArmidError, nearest, quoted
+from armid.errors import ArmidError, quoted, refuse_unless_known
 from armid.model import Array, Plant
 from armid.model.effect import RESERVED_WORDS
 from armid.model.parameter import check_name
@@ -83,8 +84,7 @@ def new_command(
     """
     from armid.record import write_campaign
 
-    if kind not in NEW_KINDS:
-        raise ArmidError(f"kind '{kind}' is not known: {nearest(kind, NEW_KINDS)}")
+    refuse_unless_known(kind, NEW_KINDS, f"kind '{kind}' is not known")
     if style and (kind, style) not in STYLES:
         raise ArmidError(f"--style '{style}' of kind '{kind}': an identifier has the style 'function'")
     if (files or more) and kind != CAMPAIGN:
@@ -96,12 +96,7 @@ def new_command(
     plant = next(iter(registry.own["plants"].values()), None)
     if plugins and (plant is None or not files):
         raise ArmidError("--plugin: the plant of a campaign that is made by --from is expected")
-    taken = set(getattr(registry, CATALOGUES[kind]) if kind in CATALOGUES else ())
-    if kind == "analysis":
-        from armid.study.document import ANALYSES
-
-        taken |= {a.name for a in ANALYSES}
-    check_new_name(kind, name, taken, template)
+    check_new_name(kind, name, things_of(CATALOGUES[kind], registry) if kind in CATALOGUES else (), template)
     file, trying = FILES.get(kind, ("{}.py", f"{TRYING.get(kind, 'armid check {}')}:{name}"))
     target = out / file.format(name)
     if os.path.lexists(target):
@@ -112,7 +107,7 @@ def new_command(
         write_campaign(target, text, tables)
     else:
         with NewFiles(out) as new_files:
-            text = filled("study.toml.txt", name=name) if kind == NEW_STUDY else python_file(template, name)
+            text = filled(f"{template}.{'toml' if kind == NEW_STUDY else 'py'}.txt", name=name)
             new_files.path(target.name).write_text(text, encoding="utf-8")
     check = " --plugin ".join([trying.format(target), *plugins])
     say(f"wrote {target}; try: {check}")
@@ -134,8 +129,7 @@ def schema_command(what: str, plugins: tuple[str, ...]) -> None:
     from armid.record.schema import CampaignSheet, json_schema, key_schema, sheet_schema
     from armid.study.spec import study_schema
 
-    if what not in (CAMPAIGN, NEW_STUDY):
-        raise ArmidError(f"schema '{what}' is not known: {nearest(what, (CAMPAIGN, NEW_STUDY))}")
+    refuse_unless_known(what, (CAMPAIGN, NEW_STUDY), f"schema '{what}' is not known")
     registry = load_registry(plugins)
     registered = {kind: getattr(registry, kind) for kind in ("plants", "effects", "identifiers")}
     keys = {key.key: key_schema(key) for plant in registry.plants.values() for key in plant.keys}
@@ -149,11 +143,6 @@ def filled(file: str, **values: object) -> str:
     return Template((files("armid.cli") / "templates" / file).read_text(encoding="utf-8")).substitute(values)
 
 
-def python_file(template: str, name: str) -> str:
-    """Return the text of a Python file that declares one thing; template: a kind, or what STYLES names."""
-    return filled(f"{template}.py.txt", name=name)
-
-
 def check_new_name(kind: str, name: str, taken: Collection[str], template: str) -> None:
     """Refuse a name that a starting file could not have; taken: names of the same kind that are registered."""
     if kind in FILES:
@@ -163,7 +152,7 @@ def check_new_name(kind: str, name: str, taken: Collection[str], template: str) 
     check_name(name, kind)
     if name in taken or (kind == "effect" and name in RESERVED_WORDS):
         raise ArmidError(f"{kind} '{name}' is there already: another name is expected")
-    tokens = generate_tokens(StringIO(python_file(template, "_")).readline)
+    tokens = generate_tokens(StringIO(filled(f"{template}.py.txt", name="_")).readline)
     if any(token.type == NAME and token.string == name for token in tokens):
         raise ArmidError(f"{kind} '{name}' cannot have this name, which the file itself uses: another is expected")
     module = find_spec(name)
@@ -256,14 +245,14 @@ def column_of(header: str) -> FileColumn:
     if apart is None and header.rpartition(" ")[2] in {*UNIT_ENDS, *DRIVEN_IN}:
         apart = re.fullmatch(r"(.*) (\S+)", header)
     if apart:
-        words, unit = apart[1].strip().lower().replace(" ", "_"), apart[2].strip()
-        end, factor = DRIVEN_IN.get(unit, (UNIT_ENDS.get(unit, ""), 1.0))
-        return FileColumn(header, words, end, "" if end else unit, factor)
-    ends = {*UNIT_ENDS.values(), *SECONDS}
-    end = max((e for e in ends if header.endswith(f"_{e}") or header == e == "rpm"), key=len, default="")
-    words = header.removesuffix(f"_{end}").lower().replace(" ", "_") if end else header.lower()
-    end, factor = DRIVEN_IN.get(end, (end, 1.0))
-    return FileColumn(header, words, end, "", factor)
+        words, unit = apart[1], apart[2].strip()
+        end = UNIT_ENDS.get(unit, "")
+    else:
+        ends = {*UNIT_ENDS.values(), *SECONDS}
+        end = max((e for e in ends if header.endswith(f"_{e}") or header == e == "rpm"), key=len, default="")
+        words, unit = header.removesuffix(f"_{end}"), ""
+    end, factor = DRIVEN_IN.get(unit or end, (end, 1.0))
+    return FileColumn(header, words.strip().lower().replace(" ", "_"), end, "" if end else unit, factor)
 
 
 def quantity_of(column: FileColumn) -> str:
@@ -324,7 +313,12 @@ def moves_straight(roles: Mapping[str, FileColumn], table: CsvTable) -> bool:
                          "that turns, which armid has no plant for: a plant of your own by `armid new plant` is "
                          "expected")  # fmt: skip
     for quantity, column in roles.items():
-        check_unit(quantity, column, linear, f"{table.where}: the unit of {quoted(column.header)}")
+        # the input of a turning machine may have any unit
+        ends = HEADERS[quantity, linear][1] if quantity != "time" and (linear or quantity != "drive") else ()
+        if ends and (column.unit or (column.end and column.end not in ends)):
+            known = [unit for unit, end in UNIT_ENDS.items() if end in ends and " " not in unit]
+            raise ArmidError(f"{table.where}: the unit of {quoted(column.header)} is "
+                             f"{quoted(column.unit or column.end)}: one of {', '.join(known)} is expected")  # fmt: skip
     return linear
 
 
@@ -358,16 +352,6 @@ def roles_in(table: CsvTable, plant: Plant, notes: list[str]) -> tuple[dict[str,
         if wanted.required and wanted.name not in roles:
             raise missing(table, f"column for input '{wanted.name}'", ports[wanted.name][0])
     return {"time": time_of(table, columns, roles), **roles}, headers
-
-
-def check_unit(quantity: str, column: FileColumn, linear: bool, where: str) -> None:
-    """Refuse a unit that is not known or not that of its quantity; the input of a turning machine may have any."""
-    if quantity == "time" or (quantity == "drive" and not linear):
-        return
-    ends = HEADERS[quantity, linear][1]
-    if column.unit or (column.end and column.end not in ends):
-        known = [unit for unit, end in UNIT_ENDS.items() if end in ends and " " not in unit]
-        raise ArmidError(f"{where} is {quoted(column.unit or column.end)}: one of {', '.join(known)} is expected")
 
 
 def roles_of(table: CsvTable) -> dict[str, FileColumn]:
@@ -431,12 +415,12 @@ def seconds_of(column: FileColumn, table: CsvTable, notes: list[str]) -> float:
         raise ArmidError(f"{table.file}: time does not rise from row {back[0] + 1} to row {back[0] + 2} of "
                          f"{quoted(column.header)}, {times[back[0]]:g} and {times[back[0] + 1]:g}: a time that rises "
                          "from row to row is expected")  # fmt: skip
-    if column.end in SECONDS:
-        notes.append(f"time_s: the column {quoted(column.header)}")
-        return SECONDS[column.end]
-    in_ms = bool(np.all(times == np.rint(times)) and np.median(np.diff(times)) >= 1.0)
-    notes.append(f"time_s: the column {quoted(column.header)}; GUESS: it is in {'ms' if in_ms else 's'}")
-    return SECONDS["ms" if in_ms else "s"]
+    end, guess = column.end, ""
+    if end not in SECONDS:
+        end = "ms" if np.all(times == np.rint(times)) and np.median(np.diff(times)) >= 1.0 else "s"
+        guess = f"; GUESS: it is in {end}"
+    notes.append(f"time_s: the column {quoted(column.header)}{guess}")
+    return SECONDS[end]
 
 
 def rewritten(

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
-from armid.errors import ArmidError, nearest, printable
+from armid.errors import ArmidError, printable, refuse_unless_known
 from armid.progress import LOG
 
 if TYPE_CHECKING:
@@ -261,6 +261,5 @@ def intervals(texts: Iterable[str], option: str) -> dict[str, tuple[float, float
 
 
 def accuracy_of(text: str) -> str | None:
-    if text not in ACCURACIES:
-        raise ArmidError(f"--accuracy '{text}': {nearest(text, ACCURACIES)}")
+    refuse_unless_known(text, ACCURACIES, f"--accuracy '{text}'")
     return None if text == "auto" else text

@@ -99,12 +99,11 @@ def report_study(folder: Path, key: Path | None, width: str, plugins: tuple[str,
     with NewFiles(place) as files:
         if width:
             write_prints(document, width, files.path)
+            made = f"{len(files.names)} figures as PDF to {place}"
         else:
             write_report(document, files)
-    if width:
-        say(f"wrote {len(files.names)} figures as PDF to {place}")
-    else:
-        say(f"wrote report.md and {len(files.names) - 2} tables and figures to {place}, all on one page in {PAGE_FILE}")
+            made = f"report.md and {len(files.names) - 2} tables and figures to {place}, all on one page in {PAGE_FILE}"
+    say(f"wrote {made}")
     give(answer=document.said, folder=place, files=files.names)
 
 
@@ -112,12 +111,10 @@ def kind_in(folder: Path) -> Kind | None:
     """Return the kind of result that a folder holds, None for a study, whose store may be named itself."""
     if folder.name == STUDY_FILE or (folder / STUDY_FILE).is_file():
         return None
-    kinds = [kind for kind in (LOOP, IDENTIFICATION) if (folder / kind.file).is_file()]
-    if len(kinds) > 1:
-        names = " and ".join(kind.file for kind in kinds)
-        raise ArmidError(f"{folder} holds {names}, which two commands wrote: one of them is expected")
-    if not kinds and (folder / IDENTIFIABILITY.file).is_file():
-        return IDENTIFIABILITY
+    kinds = [kind for kind in (LOOP, IDENTIFICATION, IDENTIFIABILITY) if (folder / kind.file).is_file()]
+    if kinds[:2] == [LOOP, IDENTIFICATION]:
+        raise ArmidError(f"{folder} holds {LOOP.file} and {IDENTIFICATION.file}, which two commands wrote: one of them "
+                         "is expected")  # fmt: skip
     if kinds:
         return kinds[0]
     names = f"{STUDY_FILE} of `armid study`, {LOOP.file} of `{LOOP.command}` or {IDENTIFICATION.file}"

@@ -15,7 +15,7 @@ from pymoo.core.algorithm import Algorithm
 from armid.engine import golden_steps
 from armid.errors import ArmidError, nearest_registered
 from armid.identifiers.evolutionary import EVOLUTIONARY
-from armid.identifiers.identifier import SMALLEST_SHARE, Identifier, Option, checked, options_in
+from armid.identifiers.identifier import SMALLEST_SHARE, TRAITS, Identifier, Option, checked, options_in
 from armid.identifiers.local import LEAST_SQUARES, NLOPT
 from armid.identifiers.own import FOREIGN
 from armid.identifiers.pso import PSO
@@ -33,15 +33,11 @@ def chain_of(phases: Sequence[Identifier]) -> Identifier:
     what is left. Options of a phase carry its name, as in `pso.velocity_limit`.
     """
     for phase in phases[1:]:
-        if phase.is_global and not phase.name.startswith("multistart:"):
+        if phase.is_global and not phase.name.startswith(PREFIX):
             raise ArmidError(f"identifier '{phase.name}' is global, in a chain it is expected to be the first")
-    return Identifier(
-        "+".join(phase.name for phase in phases), partial(built_chain, tuple(phases)),
-        ", then ".join(phase.name for phase in phases), is_global=any(phase.is_global for phase in phases),
-        uses_gradient=any(phase.uses_gradient for phase in phases),
-        is_stochastic=any(phase.is_stochastic for phase in phases),
-        needs_residuals=any(phase.needs_residuals for phase in phases),
-    )  # fmt: skip
+    names = [phase.name for phase in phases]
+    flags: dict[str, Any] = {flag: any(getattr(phase, flag) for phase in phases) for flag in TRAITS}
+    return Identifier("+".join(names), partial(built_chain, tuple(phases)), ", then ".join(names), **flags)
 
 
 def built_chain(phases: tuple[Identifier, ...], budget: int, **options: Any) -> SearchAlgorithm:
@@ -89,7 +85,7 @@ def shares_of(given: Any, n_phases: int) -> list[float]:
         shares = [0.5**phase for phase in range(1, n_phases)]
     else:
         parts = given.split(":") if isinstance(given, str) else given if isinstance(given, list | tuple) else [given]
-        shares = [checked("share", as_number(part), about=SHARE_OF_BUDGET) for part in parts]
+        shares = [checked("share", as_number(part), float, SHARE_OF_BUDGET) for part in parts]
     if len(shares) != n_phases - 1 or sum(shares) >= 1.0:
         raise ArmidError(f"share is {given!r}, expected {n_phases - 1} shares of the budget with a sum below 1, "
                          "one for each phase but the last, such as 0.5 or 0.5:0.3")  # fmt: skip
@@ -118,7 +114,6 @@ def built_multistart(local: Identifier, budget: int, **options: Any) -> SearchAl
     build = partial(configured.build, budget)
     if not takes_start(build()):
         raise ArmidError(f"identifier '{local.name}' takes no start x0, {PREFIX} expects one that does")
-
     return SearchAlgorithm(partial(search_again, build), budget)
 
 
@@ -150,11 +145,8 @@ def of_phases(
         if dot and name in named:
             named[name][option] = value
         elif key not in own:
-            known = [
-                *own,
-                *(f"{n}.{each}" for n, phase in zip(names, phases, strict=True) for each in options_of(phase)),
-            ]
-            hint = [f"did you mean '{near}'?" for near in get_close_matches(key, known, n=1)]
+            of_phase = (f"{n}.{each}" for n, phase in zip(names, phases, strict=True) for each in options_of(phase))
+            hint = [f"did you mean '{near}'?" for near in get_close_matches(key, [*own, *of_phase], n=1)]
             hint += [f"those of a phase carry its name, {', '.join(f'{name}.OPTION' for name in named)}"]
             raise ArmidError(f"{whose} has no option '{key}', {hint[0]}")
     return tuple(

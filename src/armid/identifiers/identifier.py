@@ -48,9 +48,6 @@ class Option:
     tune: tuple[float, float] | None = None
 
 
-NUMBER_OPTION = Option("")
-
-
 def option(default: Any, meaning: str, unit: str = "1", **limits: Any) -> Any:
     """Return the field of an option; limits: those of `Option`. A default of None is the algorithm's own choice."""
     return field(default=default, metadata={"option": Option(meaning, unit, **limits)})
@@ -95,7 +92,7 @@ def kind_of(option: Any) -> type:
     return next(kind for kind in (bool, int, float, str) if kind in kinds)
 
 
-def checked(name: str, value: Any, kind: type = float, about: Option = NUMBER_OPTION) -> Any:
+def checked(name: str, value: Any, kind: type, about: Option) -> Any:
     """Return a value as its kind; refuse with ArmidError another kind, or a number outside the limits."""
     if isinstance(value, str) and value in about.known:
         return value
@@ -115,6 +112,10 @@ def checked(name: str, value: Any, kind: type = float, about: Option = NUMBER_OP
 
 def checked_count(name: str, value: Any) -> int:
     return int(checked(name, value, int, Option("", least=1, most=LARGEST_WHOLE)))
+
+
+# What an identifier can do and needs; a composed one as any of its parts.
+TRAITS = ("is_global", "uses_gradient", "is_stochastic", "needs_residuals")
 
 
 @dataclass(frozen=True)

@@ -133,14 +133,14 @@ def cell(value: Any, column: Column) -> Cell:
 class Figure:
     """A figure.
 
-    name: of its files, without ending. caption: what each mark is. draw: returns it as matplotlib's; None for one that
-    is only stored. svg: its stored text; "" for one that is drawn when it is needed.
+    name: of its files, without ending. caption: what each mark is. draw: returns it as matplotlib's, nothing for one
+    that is only stored. svg: its stored text; "" for one that is drawn when it is needed.
     """
 
     name: str
     title: str
     caption: str
-    draw: Callable[[], Any] | None = None
+    draw: Callable[[], Any] = lambda: None
     svg: str = ""
 
 

@@ -32,16 +32,14 @@ def write_files(document: Document, path_of: Callable[[str], Path]) -> None:
             path_of(f"{table.name}.tex").write_text(latex(table), encoding="utf-8")
     with angles_in(document.angle):
         for figure in document.figures:
-            if figure.draw is not None:
-                save(figure.draw(), path_of(f"{figure.name}.png"), path_of(f"{figure.name}.svg"))
+            save(figure.draw(), path_of(f"{figure.name}.png"), path_of(f"{figure.name}.svg"))
 
 
 def write_prints(document: Document, width: str, path_of: Callable[[str], Path]) -> None:
     """Write each figure as PDF of the width of a page's "single" or "double" column."""
     with angles_in(document.angle):
         for figure in document.figures:
-            if figure.draw is not None:
-                save_for_print(figure.draw, path_of(f"{figure.name}.pdf"), width)
+            save_for_print(figure.draw, path_of(f"{figure.name}.pdf"), width)
 
 
 def csv(table: Table) -> str:

@@ -24,7 +24,7 @@ def html(document: Document, stored: Mapping[str, str] | None = None) -> str:
 
     def picture(figure: Figure) -> Markup:
         """Return a figure as part of the page, its ids made its own by its name."""
-        text = (stored or {}).get(figure.name) or figure.svg or svg_text(figure.draw() if figure.draw else None)
+        text = (stored or {}).get(figure.name) or figure.svg or svg_text(figure.draw())
         return inline(text, f"{figure.name}-", figure.title, figure.title)
 
     environment = templates()

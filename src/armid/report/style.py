@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextvars import ContextVar
+from contextvars import ContextVar, copy_context
 from io import StringIO
 from pathlib import Path
 from textwrap import fill
@@ -150,11 +150,9 @@ def save_for_print(draw: Callable[[], Any], path: Path, width: str) -> None:
     import matplotlib as mpl
     from matplotlib.text import Text
 
-    token = PRINTED_WIDTH.set(width)
-    try:
-        figure = draw()
-    finally:
-        PRINTED_WIDTH.reset(token)
+    printing = copy_context()
+    printing.run(PRINTED_WIDTH.set, width)
+    figure = printing.run(draw)
     figure.suptitle("")
     panels_there = [axis for axis in figure.axes if axis.get_subplotspec() is not None and axis.get_title()]
     if len(panels_there) == 1:

@@ -129,12 +129,11 @@ def _case(
 
 
 def _space(
-    model: Model, overrides: Mapping[str, Override], spec: StudySpec, entry: CaseSpec | None, where: str
+    model: Model, overrides: Mapping[str, Override], spec: StudySpec, entry: CaseSpec, where: str
 ) -> Space:  # fmt: skip
     """Return bounds and fixed values; what the case fixes or frees holds against what the study says."""
-    own_bounds, own_fixed = (entry.bounds, entry.fixed) if entry else ({}, {})
-    fixed = {name: v for name, v in spec.fixed.items() if name not in own_bounds} | dict(own_fixed)
-    bounds = {name: b for name, b in spec.bounds.items() if name not in own_fixed} | dict(own_bounds)
+    fixed = {name: v for name, v in spec.fixed.items() if name not in entry.bounds} | dict(entry.fixed)
+    bounds = {name: b for name, b in spec.bounds.items() if name not in entry.fixed} | dict(entry.bounds)
     with located(where):
         return space_of(model, overrides, bounds, fixed)
 
@@ -265,7 +264,7 @@ def _random_cases(spec: StudySpec, model: Model, folder: Path, where: str) -> li
     wanted = validated(RandomCasesSpec, spec.random_cases, where)
     if wanted.margin >= 0.5:
         raise ArmidError(f"{where}: margin is {wanted.margin:g}, a share of the range from 0 to below 0.5 is expected")
-    space, n = _space(model, {}, spec, None, where), wanted.n
+    space, n = _space(model, {}, spec, CaseSpec(name="random"), where), wanted.n
     rng = np.random.default_rng(wanted.seed)
     low, high = space.low[space.free], space.high[space.free]
     parts = np.array([rng.permutation(n) for _ in low]).T
@@ -357,8 +356,9 @@ class RunCache:
         case = self._once("case", shared | {"noise": level}, lambda: self._prepared(settings, level))
         if level == 0.0:
             return case, case.replays
-        noisy = [in_window(r, settings["window_s"]) for r in noisy_records(case.records, settings)]
-        return case, tuple(_measured_again(r, record) for r, record in zip(case.replays, noisy, strict=True))
+        # on the schedules of the records without noise: the manoeuvres are the same
+        noisy = (in_window(r, settings["window_s"]) for r in noisy_records(case.records, settings))
+        return case, tuple(r.changed(record=n.until_window_end()) for r, n in zip(case.replays, noisy, strict=True))
 
     def _prepared(self, settings: Mapping[str, Any], level: float) -> PreparedCase:
         if "suite" in settings:
@@ -401,9 +401,3 @@ class RunCache:
         if len(self._kept) > MOST_KEPT:
             del self._kept[next(iter(self._kept))]
         return self._kept[key]
-
-
-def _measured_again(replay: Replay, record: Record) -> Replay:
-    """Return a replay of the same manoeuvre with another measurement, on the schedule that it has."""
-    assert [p.window for p in replay.pieces] == [p.window for p in record.pieces]
-    return replay.changed(record=record.until_window_end())

@@ -56,7 +56,6 @@ def parts_of(name: str, output: Any) -> dict[str, Any]:
     output: a DataFrame, a figure (or what carries one, such as axes), or a dict, tuple or list of these; None: nothing.
     """
     from matplotlib.figure import Figure
-    from pandas import DataFrame
 
     if output is None:
         return {}

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from armid.errors import ArmidError, nearest
+from armid.errors import ArmidError, refuse_unless_known
 from armid.model import Array, Plant
 from armid.record.schema import above_zero, key, number, text, unknown_name, validated
 from armid.record.table import read_table, time_column
@@ -78,18 +78,15 @@ class Steps(InputSignal):
     def unit_values(self, times: Array) -> Array:
         # rounding must not move a multiple of the hold to the level before
         places = np.floor(times / self.hold_s + 1e-9).astype(int)
-        return np.asarray(self.levels(np.random.default_rng(self.seed).random(places[-1] + 1))[places])
-
-    def levels(self, drawn: Array) -> Array:
-        return 2.0 * drawn - 1.0
+        return np.asarray(2.0 * np.random.default_rng(self.seed).random(places[-1] + 1)[places] - 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Prbs(Steps):
     """A pseudo-random binary sequence: -1 or 1, each held for a time."""
 
-    def levels(self, drawn: Array) -> Array:
-        return np.where(drawn < 0.5, -1.0, 1.0)
+    def unit_values(self, times: Array) -> Array:
+        return np.where(super().unit_values(times) < 0.0, -1.0, 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,8 +124,7 @@ def kept(table: Any, folder: Path, times: Array, where: str) -> dict[str, Any]:
         raise ArmidError(f"{where}: `kind` or `csv` is expected, one of them")
     if "csv" in table:
         return {"values": column_values(validated(InputColumn, table, where), folder, times, where)}
-    if table["kind"] not in SIGNALS:
-        raise ArmidError(f"{where}: kind '{table['kind']}' is unknown: {nearest(str(table['kind']), SIGNALS)}")
+    refuse_unless_known(str(table["kind"]), SIGNALS, f"{where}: kind '{table['kind']}' is unknown")
     return asdict(validated(SIGNALS[table["kind"]], table, where))
 
 

@@ -17,7 +17,7 @@ from armid.record.reader import CAMPAIGN_FILE, CSV_SUFFIX
 from armid.record.schema import unknown_name, validated
 from armid.study.cases import RunCache, digest_of, unchanged_campaign
 from armid.study.spec import CLOSES_LOOP, LOOP_REPORTS, WHOLE_WINDOW, LoopSpec, StudyRegistry, lookup
-from armid.study.store import Performed, Planned, planned
+from armid.study.store import Planned, planned
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +106,7 @@ class LoopStudy:
             yield planned(settings, case, CLOSES_LOOP, "", None, WHOLE_WINDOW, spec.seed, 0)
 
     @staticmethod
-    def perform(settings: Mapping[str, Any], cache: RunCache) -> Performed:
+    def perform(settings: Mapping[str, Any], cache: RunCache) -> dict[str, Any]:
         began = time.process_time()
         registry, folder = cache.registry, cache.folder / settings["campaigns"] / settings["case"]
         campaign = unchanged_campaign(folder, _files(folder), settings["digest"], settings["case"], registry)
@@ -119,7 +119,7 @@ class LoopStudy:
         rng, fixed = default_rng(settings["seed"]), settings["fixed"]
         closed = close_loop(model, campaign, candidates, rng, bounds, fixed, threads=1)
         report = dumps(report_of(closed), allow_nan=False)
-        return Performed(0, str(model), {"loops": [(closed.verdict, time.process_time() - began, report)]})
+        return {"model": str(model), "rows": {"loops": [(closed.verdict, time.process_time() - began, report)]}}
 
 
 def _campaigns(spec: LoopSpec, folder: Path, where: str) -> dict[str, str]:

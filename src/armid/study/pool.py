@@ -14,13 +14,12 @@ import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from importlib import import_module
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from pathlib import Path
-from queue import SimpleQueue
 from threading import Lock
 from typing import Any
 
@@ -81,7 +80,7 @@ class Worker:
             error = f"the worker process {content if word == DIED else NO_MESSAGE}, {MOST_DEATHS} times"
         return Outcome(run.run, FAILED, error, seconds=time.monotonic() - began)
 
-    def stop(self) -> None:
+    def close(self) -> None:
         """End the worker at once and for good; what it was at is lost."""
         with self._lock:
             self._is_stopped = True
@@ -140,41 +139,33 @@ class Worker:
 
 def performed_apart(setup: WorkerSetup, run: MissingRun) -> Outcome:
     """Perform one run in a process of its own."""
-    worker = Worker(setup)
-    try:
+    with closing(Worker(setup)) as worker:
         return worker.perform(run)
-    finally:
-        worker.stop()
+
+
+# The worker of a thread, here and on a cluster.
+OF_THREAD = threading.local()
 
 
 class LocalPool:
-    """Perform runs in worker processes on this machine; width: how many at a time."""
+    """Perform runs in worker processes on this machine, each with a thread that waits for it; width: how many."""
 
     def __init__(self, jobs: int, setup: WorkerSetup) -> None:
         self.width = jobs
         self._workers = [Worker(setup) for _ in range(jobs)]
-        self._idle: SimpleQueue[Worker] = SimpleQueue()
-        for worker in self._workers:
-            self._idle.put(worker)
-        self._threads = ThreadPoolExecutor(jobs)
+        unclaimed = iter(self._workers)
+        self._threads = ThreadPoolExecutor(jobs, initializer=lambda: setattr(OF_THREAD, "worker", next(unclaimed)))
 
     def submit(self, run: MissingRun) -> Future[Outcome]:
         """Perform a run as soon as a worker is idle."""
-        return self._threads.submit(self._perform, run)
+        return self._threads.submit(lambda: OF_THREAD.worker.perform(run))
 
     def close(self) -> None:
         """End at once; what is not finished is lost."""
         self._threads.shutdown(wait=False, cancel_futures=True)
         for worker in self._workers:
-            worker.stop()
+            worker.close()
         self._threads.shutdown()
-
-    def _perform(self, run: MissingRun) -> Outcome:
-        worker = self._idle.get()
-        try:
-            return worker.perform(run)
-        finally:
-            self._idle.put(worker)
 
 
 @contextmanager
@@ -189,7 +180,6 @@ def sigint_blocked() -> Iterator[None]:
 
 # Time in which a cluster has to answer [s].
 CONNECT_S = 20.0
-OF_THREAD = threading.local()
 
 
 def perform_on_cluster(run: MissingRun, setup: WorkerSetup) -> Outcome:
@@ -197,7 +187,7 @@ def perform_on_cluster(run: MissingRun, setup: WorkerSetup) -> Outcome:
     worker = getattr(OF_THREAD, "worker", None)
     if worker is None or worker.setup != setup:
         if worker is not None:
-            worker.stop()
+            worker.close()
         worker = OF_THREAD.worker = Worker(setup)
     return worker.perform(run)
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from armid.errors import ArmidError, StudyError, caused_by, nearest
+from armid.errors import ArmidError, StudyError, caused_by, refuse_unless_known
 from armid.report.result import NewFiles, Shown
 from armid.study.store import EVERY_RUN, FILE_NAME, TALLY, RunTrace, reading, unpacked
 
@@ -74,10 +74,10 @@ class StudyResults(Shown):
         """Draw one figure of the report and return it, matplotlib's. name: which, "" for the first."""
         from armid.report.style import detached
 
-        figures = {f.name: f.draw for f in documents().report_of(self).figures if f.draw is not None}
-        if not figures or (name and name not in figures):
-            raise ArmidError(f"the report has no figure '{name}': {nearest(name, figures)}")
-        return detached(figures[name or next(iter(figures))]())
+        figures = {f.name: f.draw for f in documents().report_of(self).figures}
+        name = name or next(iter(figures), "")
+        refuse_unless_known(name, figures, f"the report has no figure '{name}'")
+        return detached(figures[name]())
 
     def save(self, folder: str | Path) -> list[str]:
         """Write page, Markdown, tables and figures of the report to a folder, all or none, and return their names."""

@@ -40,8 +40,6 @@ IDENTIFIES, CLOSES_LOOP = KIND_NAMES = ("identify", "close_loop")
 REPORTS = ("", "table1", "table2", "benchmark", "fitness")
 LOOP_REPORTS = ("", "blind", "advice")
 WHOLE_WINDOW = "whole"
-# Kinds of what a model is made of.
-MODELS = ("plants", "effects")
 PLAIN_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 # Neither key nor number of a study may be larger: what it asks for has to fit into memory and a lifetime.
 LARGEST_COUNT = 10**9
@@ -372,12 +370,12 @@ def study_schema() -> dict[str, Any]:
 class StudyRegistry(Registry):
     """What a study may name.
 
-    plugins: `FILE.py:attribute` of the user's own. digests: (kind, name) -> hash of the file that it was read from; it
+    plugins: `FILE.py:attribute` of the user's own. digests: `kind name` -> hash of the file that it was read from; it
     is part of a run's settings, so that results of an older version of that file are not taken for the present one's.
     """
 
     plugins: tuple[str, ...] = ()
-    digests: Mapping[tuple[str, str], str] = field(default_factory=dict)
+    digests: Mapping[str, str] = field(default_factory=dict)
 
     def identifier(self, name: str, where: str) -> Any:
         with located(where):
@@ -394,20 +392,19 @@ class StudyRegistry(Registry):
 
     def digests_of(self, kind: str, *names: str) -> dict[str, str]:
         """Return `kind name` -> hash for those of the names that are the user's own; chains are looked into."""
-        parts = [part for name in names for part in re.split(r"[+:]", name)]
-        return {f"{kind} {part}": self.digests[kind, part] for part in parts if (kind, part) in self.digests}
+        wanted = {f"{kind} {part}" for name in names for part in re.split(r"[+:]", name)}
+        return {own: digest for own, digest in self.digests.items() if own in wanted}
 
     def digests_of_models(self) -> dict[str, str]:
         """Return `kind name` -> hash of the user's own plants and effects."""
-        return {f"{kind} {name}": digest for (kind, name), digest in self.digests.items() if kind in MODELS}
+        return {own: digest for own, digest in self.digests.items() if own.startswith(("plants ", "effects "))}
 
     def refuse_changed(self, own: Mapping[str, str]) -> None:
         """Refuse a run whose plug-ins are others here than where the study was read; own: `kind name` -> hash."""
-        for both, digest in own.items():
-            kind, _, name = both.partition(" ")
-            if self.digests.get((kind, name)) != digest:
-                raise MachineError(f"the plug-in that holds {name} has changed since the study was started: start it "
-                                   "again")  # fmt: skip
+        for thing, digest in own.items():
+            if self.digests.get(thing) != digest:
+                raise MachineError(f"the plug-in that holds {thing.partition(' ')[2]} has changed since the study was "
+                                   "started: start it again")  # fmt: skip
 
 
 def study_registry(plugins: Iterable[str] = ()) -> StudyRegistry:
@@ -417,8 +414,9 @@ def study_registry(plugins: Iterable[str] = ()) -> StudyRegistry:
     digests = {}
     for plugin in named:
         kind, name, _ = load_plugin(plugin)
-        own = Path(plugin.rpartition(":")[0]).resolve()
-        digests[kind, name] = hashlib.sha256(b"".join(f.read_bytes() for f in (own, *imported_beside(own)))).hexdigest()
+        file = Path(plugin.rpartition(":")[0]).resolve()
+        content = b"".join(f.read_bytes() for f in (file, *imported_beside(file)))
+        digests[f"{kind} {name}"] = hashlib.sha256(content).hexdigest()
     return StudyRegistry(registry.plants, registry.effects, registry.own, named, digests)
 
 

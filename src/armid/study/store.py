@@ -56,23 +56,12 @@ class MissingRun(NamedTuple):
     settings: str
 
 
-Rows = Mapping[str, Sequence[tuple[Any, ...]]]
-
-
-class Performed(NamedTuple):
-    """What performing a run gave: simulations used, the model's equations, and rows by table of the store."""
-
-    used: int
-    model: str
-    rows: Rows
-
-
 @dataclass(frozen=True)
 class Outcome:
     """What a run gave, as plain values that a store can keep.
 
     status: "done", or "failed" with the reason in `error`. used: simulations. seconds: of the wall clock. started_at:
-    for people; nothing depends on it. rows: table of the store -> rows of it without their run.
+    for people; nothing depends on it. model: its equations. rows: table of the store -> rows of it without their run.
     """
 
     run: str
@@ -83,7 +72,7 @@ class Outcome:
     started_at: str = ""
     model: str = ""
     versions: Mapping[str, str] = field(default_factory=dict)
-    rows: Rows = field(default_factory=dict)
+    rows: Mapping[str, Sequence[tuple[Any, ...]]] = field(default_factory=dict)
 
 
 Array = NDArray[np.float64]

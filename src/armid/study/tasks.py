@@ -7,7 +7,8 @@ names in tables), n_runs, and
 - check(performed): refuse what cannot be run, before anything is written
 - description(out): what a report needs to know, as JSON can hold it; out: folder of the store
 - plan(): every run, in the order in which they are performed
-- perform(settings, cache): perform one, in a worker; what it raises is kept as the run's error
+- perform(settings, cache): perform one, in a worker, and return fields of its `Outcome`; what it raises is kept as the
+  run's error
 """
 
 import errno
@@ -47,7 +48,7 @@ from armid.study.spec import (
     lookup,
     study_registry,
 )
-from armid.study.store import DONE, FAILED, ON, MissingRun, Outcome, Performed, Planned, packed, planned
+from armid.study.store import DONE, FAILED, ON, MissingRun, Outcome, Planned, packed, planned
 from armid.units import DEG
 
 if TYPE_CHECKING:
@@ -125,9 +126,9 @@ def perform(run: MissingRun, cache: RunCache) -> Outcome:
             raise
         if of_machine(error):
             raise MachineError(f"the machine, not a run, is at fault: {sentence(error)}") from error
-        return Outcome(run.run, FAILED, sentence(error), 0, time.perf_counter() - began, started_at)
+        return Outcome(run.run, FAILED, sentence(error), seconds=time.perf_counter() - began, started_at=started_at)
     seconds = time.perf_counter() - began
-    return Outcome(run.run, DONE, "", made.used, seconds, started_at, made.model, versions(), made.rows)
+    return Outcome(run.run, DONE, seconds=seconds, started_at=started_at, versions=versions(), **made)
 
 
 def of_machine(error: BaseException) -> bool:
@@ -315,12 +316,12 @@ class Study:
         }  # fmt: skip
 
     @staticmethod
-    def perform(settings: Mapping[str, Any], cache: RunCache) -> Performed:
+    def perform(settings: Mapping[str, Any], cache: RunCache) -> dict[str, Any]:
         """Identify once."""
         identifier = cache.registry.identifier(settings["identifier"], "settings").with_options(settings["options"])
         if settings.get("only_built"):
             identifier.build(settings["budget"])
-            return Performed(0, "", {})
+            return {}
         case, replays = cache.replays(settings)
         train, holdout = (tuple(r for r in replays if r.record.role == role) for role in ("train", "holdout"))
         model, fitness = train[0].model, fitness_of_name(settings["fitness"], cache.registry.fitness)
@@ -334,12 +335,13 @@ class Study:
             raise KeyboardInterrupt
         near, far = identification.train, identification.holdout
         errors = (near.rmse, near.s, near.s1, near.s2, None if far is None else far.rmse)
-        return Performed(identification.used, case.equations, {
+        rows = {
             "identified": [(identification.used, identification.n_failed, identification.value, identification.stopped,
                             *errors)],
             "parameters": _parameter_rows(identification),
             "traces": [(json.dumps(case.space.free_names), packed(*identification.trace, identification.improved))],
-        })  # fmt: skip
+        }  # fmt: skip
+        return {"used": identification.used, "model": case.equations, "rows": rows}
 
 
 def _entries(spec: StudySpec, unit: str, registry: StudyRegistry, where: str) -> tuple[EntrySpec, ...]:

@@ -111,8 +111,7 @@ def trace_errors(trace: RunTrace, truth: Mapping[str, float]) -> Array:
     known = ~np.isnan(trace.X[-1]) & ~np.isnan(true)
     if not known.any():
         return np.full(trace.evaluations.size, np.nan)
-    errors: Array = np.max(np.abs(trace.X[:, known] - true[known]) / np.abs(true[known]), axis=1)
-    return errors
+    return np.asarray(np.max(np.abs(trace.X[:, known] - true[known]) / np.abs(true[known]), axis=1))
 
 
 WITHOUT_NOISE, SPEED_UNIT = "noise-free", "rad/s"
@@ -236,7 +235,14 @@ class Evidence:
 
     @cached_property
     def published(self) -> DataFrame:
-        return published_values(self.study)
+        """Values of the paper with their relative errors, one row a case and parameter."""
+        rows = []
+        for case in self.study["cases"]:
+            truth = case.get("truth") or {}
+            for parameter, value in (case.get("published") or {}).items():
+                true = float(truth.get(parameter, np.nan))
+                rows.append((case["name"], parameter, true, float(value), abs(value - true) / abs(true)))
+        return DataFrame(rows, columns=["case", "parameter", "truth", "published", "relative_error"])
 
     @cached_property
     def colours(self) -> dict[str, int]:
@@ -363,13 +369,3 @@ def ordered(runs: DataFrame, study: dict[str, Any]) -> DataFrame:
 
 def every_nth(rows: DataFrame, most: int) -> DataFrame:
     return rows.iloc[:: max(1, -(-len(rows) // most))]
-
-
-def published_values(study: dict[str, Any]) -> DataFrame:
-    rows = []
-    for case in study["cases"]:
-        truth = case.get("truth") or {}
-        for parameter, value in (case.get("published") or {}).items():
-            true = float(truth.get(parameter, np.nan))
-            rows.append((case["name"], parameter, true, float(value), abs(value - true) / abs(true)))
-    return DataFrame(rows, columns=["case", "parameter", "truth", "published", "relative_error"])

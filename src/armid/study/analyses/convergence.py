@@ -189,8 +189,7 @@ CONVERGENCE = Analysis("convergence", "Convergence", convergence_parts, "error a
 
 def median(held_values: Array) -> Array:
     """Return the median at each count of simulations, (n_grid,), a value that a run had."""
-    medians: Array = np.quantile(held_values, 0.5, axis=0, method="inverted_cdf").astype(float)
-    return medians
+    return np.asarray(np.quantile(held_values, 0.5, axis=0, method="inverted_cdf"), float)
 
 
 def convergence_figure(evidence: Evidence, own: NDArray[np.bool_], values: Array, label: str, floor: float) -> Any:
@@ -239,8 +238,7 @@ def area_over_curve(hits: Array, budget: Array) -> Array:
     A = mean over targets of max(0, 1 - ln h / ln B). hits: first hits h, (n_runs, n_targets); budget: B above 1.
     Source: Lopez-Ibanez et al. 2024, doi:10.1162/evco_a_00341 (the share of an attainment surface that is covered).
     """
-    left: Array = np.clip(1.0 - np.log(hits) / np.log(budget)[:, np.newaxis], 0.0, 1.0).mean(axis=1)
-    return left
+    return np.asarray(np.clip(1.0 - np.log(hits) / np.log(budget)[:, np.newaxis], 0.0, 1.0).mean(axis=1))
 
 
 def areas(evidence: Evidence) -> Table:

@@ -137,7 +137,7 @@ def valley_figure(ends: DataFrame, colours: Mapping[str, int]) -> Any:
     with no_formulas():
         grid = sns.PairGrid(shown, vars=names, hue="shown", hue_order=hues, palette=palette, corner=True, height=2.9,
                             hue_kws={"marker": marks})  # fmt: skip
-        grid.map_lower(scatter)
+        grid.map_lower(pyplot().plot, ls="", ms=5, mfc="none", mew=0.9)
         grid.map_diag(histogram)
         linear = linear_range(shown[names].to_numpy(float))
         ticks = signed_powers(linear, float(np.abs(shown[names].to_numpy(float)).max()))
@@ -174,12 +174,6 @@ def histogram(x: np.ndarray, **look: Any) -> None:
     """Draw how many runs deviate by as much, in bins that are as wide as the axis shows them."""
     ends = np.geomspace(1e-7, 1e3, 41)
     pyplot().gca().hist(x, np.concatenate([-ends[::-1], ends]), histtype="step", color=look["color"])
-
-
-def scatter(x: np.ndarray, y: np.ndarray, **look: Any) -> None:
-    pyplot().gca().plot(
-        x, y, ls="", marker=look["marker"], ms=5, mfc="none", mec=look["color"], mew=0.9, label=look.get("label")
-    )
 
 
 # Smaller relative errors are drawn there.

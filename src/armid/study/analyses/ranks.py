@@ -184,7 +184,7 @@ def signed_rank(first: Array, second: Array) -> float:
     Differences are taken between the logarithms, since errors span many powers of ten, zero and infinity counting as
     the ends of all floats; Pratt's rule for ties.
     """
-    from scipy.stats import permutation_test, wilcoxon
+    from scipy.stats import permutation_test, rankdata, wilcoxon
 
     ends = np.finfo(np.float64)
     x, y = (np.log(np.clip(v, ends.tiny, ends.max)) for v in (first, second))
@@ -193,16 +193,13 @@ def signed_rank(first: Array, second: Array) -> float:
         return 1.0
     if len(differences) > EXACT_TEST_TO:
         return float(wilcoxon(differences, zero_method="pratt").pvalue)
+
+    def signed_ranks(d: Array, axis: int) -> Any:
+        return np.sum(np.sign(d) * rankdata(np.abs(d), axis=axis), axis=axis)
+
     # `wilcoxon` counts the same signs one by one, in Python: seconds a pair
     return float(permutation_test((differences,), signed_ranks, permutation_type="samples", vectorized=True,
                                   n_resamples=2**EXACT_TEST_TO).pvalue)  # fmt: skip
-
-
-def signed_ranks(differences: Array, axis: int) -> Array:
-    """Return the sum of the ranks of the sizes of differences along an axis, each with its sign."""
-    from scipy.stats import rankdata
-
-    return np.asarray(np.sum(np.sign(differences) * rankdata(np.abs(differences), axis=axis), axis=axis))
 
 
 def a12(first: Sequence[float] | Array, second: Sequence[float] | Array) -> float:
