@@ -64,8 +64,8 @@ def test_missing_effect_is_named_and_the_parameters_come_right(closed):
     found = closed("supply_sag=0.010")
     assert found.effects == ("supply_sag",)
     assert (found.verdict, found.also) == ("explained", ())
-    assert found.before.holdout_error.chi2_per_sample > 2.0
-    assert found.after.holdout_error.chi2_per_sample < 1.1
+    assert found.before.holdout.errors.chi2_per_sample > 2.0
+    assert found.after.holdout.errors.chi2_per_sample < 1.1
     for name, value in TRUTH.items():
         assert found.parameters[name] == pytest.approx(value, rel=0.01)
     assert max(off_by(found)) < 1.5
@@ -179,8 +179,8 @@ def test_constants_that_are_off_leave_noise_and_no_name(stand):
     assert taken_as_exact.chi2 > 1.5 * len(taken_as_exact.residual)
     found = close_loop(model, replace(there, tolerances=tolerances_of({}, campaign.plant, "")), CANDIDATES, curve=False)
     assert (found.verdict, found.effects, found.suspects) == ("no_discrepancy", (), ())
-    assert found.after.train_error.chi2_per_sample < 1.1
-    assert found.after.holdout_error.chi2_per_sample < 1.1
+    assert found.after.train.errors.chi2_per_sample < 1.1
+    assert found.after.holdout.errors.chi2_per_sample < 1.1
     report = report_of(found)
     constants = report["probabilities"]["constants"]
     assert min(constants, key=constants.get) == "R"

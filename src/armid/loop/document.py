@@ -140,6 +140,7 @@ def loop_document(
     steps += (Sentences((details["declared_by"],)),) if details.get("declared_by") else ()
     shifts = (*details["suspects"], *details["shifts"])
     together = tuple(f"{sentence[0].upper()}{sentence[1:]}." for sentence in report["known_together"])
+    wide = [f"{name}: {'; '.join(p['causes'])}." for name, p in report["parameters"]["after"].items() if p["causes"]]
     missing, words = tuple(details["missing"]), details["advice"]
     advice = tuple(advice_sentence(a, text) for a, text in zip(report["advice"][:1], words, strict=False))
     advice += tuple(report["next_steps"])
@@ -152,7 +153,7 @@ def loop_document(
         residual_section(details, by_record),
         Section("Steps", steps or (Text("No effect was added."),)),
         Section("Parameters", (
-            parameters, *titled({"What makes the intervals wide": width_sentences(report), "": (*shifts, *together)}),
+            parameters, *titled({"What makes the intervals wide": wide, "": (*shifts, *together)}),
             *drawn("parameters"),
         )),
         Section("Is what remains noise?", (
@@ -272,12 +273,6 @@ def parameter_table(report: Mapping[str, Any]) -> Table:
         "at its bound."
     )
     return table("Parameters", ["parameter", "after", "of noise alone", "trusted", "before"], rows, note)
-
-
-def width_sentences(report: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return what makes the interval of each parameter wide."""
-    after = report["parameters"]["after"]
-    return tuple(f"{name}: {'; '.join(p['causes'])}." for name, p in after.items() if p["causes"])
 
 
 def trust_text(p: Mapping[str, Any]) -> str:

@@ -119,14 +119,6 @@ class Judgement:
     holdout: Residuals | None
 
     @property
-    def train_error(self) -> JointErrors:
-        return self.train.errors
-
-    @property
-    def holdout_error(self) -> JointErrors | None:
-        return None if self.holdout is None else self.holdout.errors
-
-    @property
     def diagnosis(self) -> Diagnosis:
         return self.train.diagnosis
 
@@ -160,16 +152,15 @@ class Judgement:
 class Step:
     """Hold one turn of the loop: the effect that was added and what became of errors and parameters.
 
-    alternatives: names of the effects that may stand in its place, the most probable first. empirical: whether it is a
-    term without a name. claimed: whether its name is claimed. probability: that the machine has it. form: word of its
-    published form, "" for the first: `--effects NAME:FORM` declares it. instead: constants without a
-    tolerance that would explain the records as well -> by which share each would be off.
+    alternatives: names of the effects that may stand in its place, the most probable first. claimed: whether its name
+    is claimed. probability: that the machine has it. form: word of its published form, "" for the first:
+    `--effects NAME:FORM` declares it. instead: constants without a tolerance that would explain the records as well ->
+    by which share each would be off.
     """
 
     effect: str
     port: str
     alternatives: tuple[str, ...]
-    empirical: bool
     claimed: bool
     probability: float
     after: Judgement
@@ -276,7 +267,8 @@ def estimates(
         one = known[name]
         low, high = min(one.low, value), max(one.high, value)
         seen = [(cause, share) for cause, share in one.causes[:MOST_CAUSES] if round(share, 2)]
-        causes = tuple(f"{words_of(cause)}, {share:.0%}" for cause, share in seen)
+        causes = tuple(f"{cause if ' ' in cause or cause == 'noise' else f'whether {cause} acts'}, {share:.0%}"
+                       for cause, share in seen)  # fmt: skip
         doubts = [REMAINS] if discrepancy and (model != inference.in_force or is_unknown) else []
         if owner is not None and inference.posterior.probability("effect", owner.public) < CLAIMED:
             doubts.append(f"{owner.public} is not certain")
@@ -292,11 +284,6 @@ def estimates(
 def shown_ends(low: float, high: float) -> tuple[float | None, float | None]:
     """Return the ends of an interval, None for one that has none."""
     return (low, high) if np.isfinite(high - low) else (None, None)
-
-
-def words_of(cause: str) -> str:
-    """Return a cause of an interval's width in words."""
-    return cause if " " in cause or cause == "noise" else f"whether {cause} acts"
 
 
 def report_of(loop: ClosedLoop) -> dict[str, Any]:
@@ -354,17 +341,18 @@ def among(library: Library) -> list[int]:
 def step_entry(step: Step) -> dict[str, Any]:
     return {
         "effect": step.effect, "form": step.form, "port": step.port, "alternatives": step.alternatives,
-        "instead": step.instead,
-        "empirical": step.empirical, "claimed": step.claimed, "probability": step.probability,
+        # a step was a term without a name in results of earlier versions, whose readers ask for the key
+        "instead": step.instead, "empirical": False, "claimed": step.claimed, "probability": step.probability,
         "error": errors_of(step.after), "parameters": step.after.entries,
     }  # fmt: skip
 
 
 def errors_of(judged: Judgement) -> dict[str, Any]:
     """Return the errors on train, on holdout (None where there is none) and on each record."""
-    replays = (*judged.train.judged, *(judged.holdout.judged if judged.holdout is not None else ()))
-    return {"train": judged.train_error, "holdout": judged.holdout_error,
-            "records": errors_by_file(replays, judged.train.candidate)}  # fmt: skip
+    train, holdout = judged.train, judged.holdout
+    replays = (*train.judged, *(() if holdout is None else holdout.judged))
+    return {"train": train.errors, "holdout": None if holdout is None else holdout.errors,
+            "records": errors_by_file(replays, train.candidate)}  # fmt: skip
 
 
 def record_entries(before: Residuals | None, after: Residuals | None) -> list[dict[str, Any]]:

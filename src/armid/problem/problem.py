@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from armid.engine import Calibration, Prepared, Schedule, Simulation, accuracy_against, calibrate, prepare, probes
 from armid.errors import ArmidError, nearest
 from armid.model import Array, Model
-from armid.problem.fitness import Fitness, joined, record_weights
+from armid.problem.fitness import Fitness, joined
 from armid.problem.meter import Meter, Metered
 from armid.problem.space import Space
 from armid.record import Piece, Record
@@ -364,6 +364,8 @@ def residual_weights(fitness: Fitness, replays: Sequence[Replay], sizes: Array) 
     return [fitness.weight_of(noise / size) / size for noise, size in pairs]
 
 
-def weights_of(fitness: Fitness, replays: tuple[Replay, ...]) -> Array:
+def weights_of(fitness: Fitness, replays: Sequence[Replay]) -> Array:
+    """Return what each record weighs where their values join, (n_records,): its duration [s], its samples, or 1."""
     records = [r.record for r in replays]
-    return record_weights(fitness, [r.duration for r in records], [r.n_samples for r in records])
+    weights = {"duration": [r.duration for r in records], "samples": [r.n_samples for r in records]}
+    return np.array(weights.get(fitness.join, [1.0] * len(records)), dtype=np.float64)
