@@ -465,14 +465,13 @@ def simulate(
     from armid.engine import simulate as run
     from armid.problem.simulated import SimulatedCampaign, candidate_of, simulated_table
 
-    of_model = (manoeuvre, population, schedule)
     if isinstance(model, Model):
         if accuracy is not None or parameters is not None or values:
             raise ArmidError("accuracy or parameters are given with a Model: a schedule and a population are expected")
         if manoeuvre is None or population is None:
             raise ArmidError("a Model is given alone: a manoeuvre and a population are expected with it")
         return run(model, manoeuvre, population, schedule or Schedule(), threads, states)
-    if any(given is not None for given in of_model):
+    if any(given is not None for given in (manoeuvre, population, schedule)):
         raise ArmidError("a manoeuvre is given with a campaign: with a Model it is expected")
     setup = opened(model, effects, plugins, window, plant=plant)
     declared = replace(setup.model, plant=setup.campaign.declared)

@@ -81,13 +81,12 @@ def answer_and_remarks(result: Mapping[str, Any]) -> tuple[tuple[str, ...], tupl
     bounded, by_others, unbounded = list[str](), list[str](), list[str]()
     for name, p in result["parameters"].items():
         deviation = deviation_text(name, p, p["deviation"])
-        if p["profile"]["bounded_low"] and p["profile"]["bounded_high"]:
-            if deviation == UNDETERMINED:
-                by_others.append(name)
-            else:
-                bounded.append(f"{name} ({deviation})")
-        else:
+        if not (p["profile"]["bounded_low"] and p["profile"]["bounded_high"]):
             unbounded.append(name)
+        elif deviation == UNDETERMINED:
+            by_others.append(name)
+        else:
+            bounded.append(f"{name} ({deviation})")
     said = [f"Bounded on both sides at 95 %, with this standard deviation: {', '.join(bounded)}."] if bounded else []
     said += [f"Bounded by the limits of other parameters alone: {', '.join(by_others)}."] if by_others else []
     said += [f"Not bounded on both sides: {', '.join(unbounded)}."] if unbounded else []

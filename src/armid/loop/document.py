@@ -22,15 +22,7 @@ from armid.inference.model import Fit
 from armid.inference.posterior import UNSEEN
 from armid.loop.figures import figures_of, record_figure
 from armid.loop.result import (
-    CARRIES_NOT,
-    DISAGREES,
-    EXPLAINED,
-    IMPLAUSIBLE,
-    NO_DISCREPANCY,
-    PARTLY,
     REPORT_VERSION,
-    TOO_ALIKE,
-    UNEXPLAINED,
     ClosedLoop,
     Judgement,
     fault_sentence,
@@ -349,7 +341,7 @@ def details_of(loop: ClosedLoop) -> dict[str, Any]:
         "headline": headline(loop),
         "conclusion": conclusion(loop),
         "shifts": (shift_sentences(before, after) if loop.steps else [])
-        + ([] if loop.verdict == NO_DISCREPANCY else constant_sentences(in_force)),
+        + ([] if loop.verdict == "no_discrepancy" else constant_sentences(in_force)),
         "doubts": doubt_sentences(after),
         "suspects": [fault_sentence(s) for s in loop.suspects],
         "declared_by": declared_by(loop),
@@ -384,14 +376,15 @@ def models_of(inference: Inference) -> list[dict[str, Any]]:
 def headline(loop: ClosedLoop) -> str:
     """Return the verdict in a few words."""
     stands = loop.withdrawn is not None and not loop.after.fails_to_carry_over
-    return "Withdrawn" if loop.verdict == CARRIES_NOT and stands else VERDICTS[loop.verdict]
+    return "Withdrawn" if loop.verdict == "does_not_carry_over" and stands else VERDICTS[loop.verdict]
 
 
 def conclusion(loop: ClosedLoop) -> str:
     """Return the verdict as one sentence."""
     sentence = {
-        IMPLAUSIBLE: implausible, DISAGREES: disagreeing_sentence, CARRIES_NOT: carried_sentence, TOO_ALIKE: doubtful,
-        NO_DISCREPANCY: nothing_missing, EXPLAINED: explained, PARTLY: partly, UNEXPLAINED: unexplained,
+        "implausible_records": implausible, "record_disagrees": disagreeing_sentence,
+        "does_not_carry_over": carried_sentence, "cannot_tell_apart": doubtful, "no_discrepancy": nothing_missing,
+        "explained": explained, "partly_explained": partly, "unexplained": unexplained,
     }  # fmt: skip
     return sentence[loop.verdict](loop)
 

@@ -30,16 +30,18 @@ from armid.report.document import curve_entry, plain
 from armid.report.result import LOOP, Kind, Result
 from armid.units import behind, shown
 
-IMPLAUSIBLE, DISAGREES, CARRIES_NOT, NO_DISCREPANCY, EXPLAINED, PARTLY, UNEXPLAINED, TOO_ALIKE = (
-    "implausible_records", "record_disagrees", "does_not_carry_over", "no_discrepancy", "explained",
-    "partly_explained", "unexplained", "cannot_tell_apart",
-)  # fmt: skip
 # Doubts for which an interval does not hold.
 REMAINS, HELD = "a significant discrepancy remains", "it rests at its bound"
 # A shape that armid sets free by itself, such as the width of a sign: nobody needs to widen its range.
 SEARCHED = "it lies at the end of the range that was searched"
 NOT_IDENTIFIED = "it was not identified: its value is declared"
 INSTEAD = "a constant without a tolerance may be off instead"
+# Kind of a fault -> words: of samples that are no data, and of a size that the whole record is off by.
+NO_DATA = {"gap": "bridged over a gap", "clipped": "clipped", "stuck": "repeated", "spikes": "spikes"}
+OFF_BY = {
+    "start": "starts elsewhere than declared, by", "offset": "its sensor is off by", "gain": "its gain is off by",
+    "drift": "its sensor drifts by", "clock": "its clock is fast by a share of",
+}  # fmt: skip
 # Listed causes of the width of an interval, and listed models.
 MOST_CAUSES, MOST_LISTED = 2, 30
 # Of the keys of report.json: 2 came with probabilities.
@@ -456,10 +458,9 @@ def along(value: float, low: float, high: float) -> tuple[float, float]:
 def fault_sentence(s: RecordFault) -> str:
     factor, name = shown(1.0, s.unit)
     unit = behind(name)
-    if s.kind in ("gap", "clipped", "stuck", "spikes"):
-        words = {"gap": "bridged over a gap", "clipped": "clipped", "stuck": "repeated", "spikes": "spikes"}[s.kind]
-        where = f"from {s.from_s:.4g} to {s.to_s:.4g} s"
-        return f"{s.record}: {s.value:.0f} samples are {words}, {where}: they count as no data."
+    if s.kind in NO_DATA:
+        return (f"{s.record}: {s.value:.0f} samples are {NO_DATA[s.kind]}, from {s.from_s:.4g} to {s.to_s:.4g} s: they "
+                "count as no data.")  # fmt: skip
     if s.kind == "label" or s.value is None or s.low is None or s.high is None:
         return f"{s.record} looks like a record of another load, or of other inputs than it tells."
     if s.parameter:
@@ -475,12 +476,9 @@ def fault_sentence(s: RecordFault) -> str:
         low, high = along(s.value, 1e3 * s.low, 1e3 * s.high)
         where = f"{s.record}, {s.output}: its sensor is" if s.output else f"{s.record}: starts"
         return f"{where} {sized(1e3 * abs(s.value), low, high, f' ms {word}')}; corrected."
-    words = {"start": "starts elsewhere than declared, by", "offset": "its sensor is off by",
-             "gain": "its gain is off by", "drift": "its sensor drifts by",
-             "clock": "its clock is fast by a share of"}[s.kind]  # fmt: skip
     where = f"{s.record}, {s.output}" if s.output else s.record
     size = sized(factor * s.value, factor * s.low, factor * s.high, unit)
-    return f"{where}: {words} {size}; corrected."
+    return f"{where}: {OFF_BY[s.kind]} {size}; corrected."
 
 
 def sized(value: float, low: float, high: float, unit: str) -> str:

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,6 +16,8 @@ from armid.problem.fitness import Fitness, joined
 from armid.problem.meter import Meter, Metered
 from armid.problem.space import Space
 from armid.record import Piece, Record
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,9 +99,7 @@ class Replay:
         return self.changed(record=self.ready.record.with_measured({self.record.output: measured}))
 
     def seen(self, runs: Sequence[Simulation]) -> Array:
-        triples = zip(self.pieces, self.record.samples, (run.outputs[self.place] for run in runs), strict=True)
-        parts = [signal if isinstance(samples, slice) and not piece.window.start else signal[:, samples]
-                 for piece, samples, signal in triples]  # fmt: skip
+        parts = [run.outputs[self.place][:, samples] for run, samples in zip(runs, self.record.samples, strict=True)]
         return np.ascontiguousarray(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1))
 
     def signal(self, candidates: Array) -> Array:
@@ -144,6 +144,12 @@ def by_record(replays: Sequence[Replay]) -> dict[ReadyRecord, list[Replay]]:
     for replay in replays:
         groups.setdefault(replay.ready, []).append(replay)
     return groups
+
+
+def by_output(replays: Sequence[Replay], values: Sequence[T]) -> dict[int, list[T]]:
+    """Return the place of each output that is recorded, in order, with the values of its replays."""
+    pairs = list(zip(replays, values, strict=True))
+    return {place: [v for r, v in pairs if r.place == place] for place in sorted({r.place for r in replays})}
 
 
 def ready_record(
