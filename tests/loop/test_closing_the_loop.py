@@ -104,12 +104,6 @@ def test_effects_that_leave_the_same_trace_are_one_group_and_get_advice(closed):
     assert trusted == set(TRUTH)
 
 
-def test_two_effects_are_found_together(closed):
-    found = closed("tilt_deg=4", "supply_sag=0.010")
-    assert (found.verdict, {s.effect for s in found.steps if s.claimed}) == ("explained", {"tilt", "supply_sag"})
-    assert max(off_by(found)) < 1.5
-
-
 def test_holdout_records_decide_nothing(closed):
     found = closed("supply_sag=0.010")
     rng = np.random.default_rng(1)
