@@ -306,20 +306,16 @@ class IdentificationProblem(Metered):
 
     def evaluated(self, X: Array, residuals: bool) -> tuple[Array, Array | None]:
         """Return fitness, +inf where one diverged, and where asked the weighted residuals, (n_candidates, n_total)."""
-        if not residuals:
-            # so many candidates have their signals in memory at a time; no result depends on it
-            size = LANES * max(MOST_AT_ONCE // (LANES * sum(x.size for x in self.measured)), 1)
-            parts = [self._fitness(X[first : first + size])[0] for first in range(0, max(len(X), 1), size)]
-            return parts[0] if len(parts) == 1 else np.concatenate(parts), None
-        values, signals = self._fitness(X)
-        return values, weighted(signals, self.measured, residual_weights(self.fitness, self.replays, self.sizes))
-
-    def _fitness(self, X: Array) -> tuple[Array, list[Array]]:
-        """Return the fitness of candidates, (n_candidates,), and their signals in each record."""
-        candidates = self.space.complete(X)
-        signals = signals_of(self.replays, candidates)
-        values = fitness_of(self.fitness, self.replays, self.measured, signals, self.record_weights, self.sizes)
-        return values, signals
+        # so many candidates have their signals in memory at a time; no result depends on it
+        size = LANES * max(MOST_AT_ONCE // (LANES * sum(x.size for x in self.measured)), 1)
+        weights = residual_weights(self.fitness, self.replays, self.sizes) if residuals else []
+        values, vectors = [], []
+        for first in range(0, max(len(X), 1), size):
+            signals = signals_of(self.replays, self.space.complete(X[first : first + size]))
+            known = self.measured, signals, self.record_weights, self.sizes
+            values.append(fitness_of(self.fitness, self.replays, *known))
+            vectors += [weighted(signals, self.measured, weights)] if residuals else []
+        return np.concatenate(values), np.concatenate(vectors) if residuals else None
 
 
 def fitness_of(
