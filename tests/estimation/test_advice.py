@@ -164,7 +164,7 @@ def test_a_louder_sensor_tells_less_apart_and_twins_nothing_does(rivals):
     repeated, *others = manoeuvre_grid(replay.model, [replay.record])
     some = others[4::30]
     with pytest.raises(ArmidError, match="1 model was given: at least two are expected"):
-        advise(rivals[:1], whitening(rivals))
+        advise(rivals[:1], whitening(rivals), some)
     twin = replace(rivals[1], name="twin")
     for advice in advise([*rivals, twin], whitening(rivals), some):
         assert not {"viscous", "twin"} <= set(advice.separates)
@@ -216,7 +216,7 @@ def test_the_advised_record_tells_apart_and_beats_a_random_one(models, stroke):
         old = made(models[right], stroke, slice(0, 701), rng, "lower.csv")
         rivals = [fitted(name, model, [old]) for name, model in models.items()]
         grid = manoeuvre_grid(models[right], [old])
-        best = advise(rivals, whitening(rivals), speed_limit=200.0 * DEGREE)[0]
+        best = advise(rivals, whitening(rivals), grid, 200.0 * DEGREE)[0]
         motions = Motions(rivals[0].records.replays, rivals[0].candidate, 200.0 * DEGREE)
         able = [f for f, _ in motions.signals(grid, rivals[0].candidate[np.newaxis])]
         chosen = {"advised": next(f for f in grid if f.keys == best.manoeuvre), "random": able[rng.integers(len(able))]}

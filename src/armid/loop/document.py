@@ -124,10 +124,6 @@ def loop_document(
             for model in ("before", "after")]  # fmt: skip
     errors = error_table("Errors", ["records", "model"], [row for row in both if row[-1] is not None], unit, ERROR_NOTE)
     parameters, chances = parameter_table(report), probability_table(report)
-    rows = [(r["record"], r["role"], model, r["error"][model]) for r in details["records"]
-            for model in ("before", "after")]  # fmt: skip
-    note = records_note(len(rows) // 2, details["n_records"])
-    by_record = error_table("Errors of each record", ["record", "role", "model"], rows, unit, note)
     steps: tuple[Part, ...] = (step_table(report),) if report["steps"] else ()
     steps += (Sentences((details["declared_by"],)),) if details.get("declared_by") else ()
     shifts = (*details["suspects"], *details["shifts"])
@@ -142,7 +138,7 @@ def loop_document(
         Section("What is missing", (chances, *drawn("probabilities", "intervals"))),
         Section("Error before and after", (errors,)),
         Section("Motion", drawn("motion")),
-        residual_section(details, by_record),
+        residual_section(details, unit),
         Section("Steps", steps or (Text("No effect was added."),)),
         Section("Parameters", (
             parameters, *titled({"What makes the intervals wide": wide, "": (*shifts, *together)}),
@@ -202,9 +198,8 @@ def probability_table(report: Mapping[str, Any]) -> Table:
     """Return what may be missing, with its probability and what may stand in its place."""
     chances = report["probabilities"]
     others = {s["effect"]: ", ".join(s["alternatives"]) for s in report["steps"]}
-    rows = [(name, p, "effect", others.get(name, "")) for name, p in chances["effects"].items()]
-    rows += [(name, p, "one record", "") for name, p in chances["records"].items()]
-    rows += [(name, p, "drift from record to record", "") for name, p in chances["drifts"].items()]
+    kinds = {"effects": "effect", "records": "one record", "drifts": "drift from record to record"}
+    rows = [(name, p, kind, others.get(name, "")) for key, kind in kinds.items() for name, p in chances[key].items()]
     rows += [("something that the library does not hold", chances["unknown"], "", ""),
              ("nothing", chances["nothing"], "", "")]  # fmt: skip
     columns = ["what", Column("probability", "probability", ".2f"), "kind", "in its place"]
@@ -278,9 +273,10 @@ def text_of_noise_alone(p: Mapping[str, Any]) -> str:
     return f"{factor * p['noise_low']:.5g} to {factor * p['noise_high']:.5g}"
 
 
-def residual_section(details: Mapping[str, Any], errors: Table) -> Section:
-    figures = []
+def residual_section(details: Mapping[str, Any], unit: str) -> Section:
+    figures, rows = [], []
     for i, record in enumerate(details["records"]):
+        rows += [(record["record"], record["role"], model, record["error"][model]) for model in ("before", "after")]
         own = record["unit"]
         was, now = (rmse_text(record["error"][model], own) for model in ("before", "after"))
         title = f"{record['file']} ({record['role']}), RMSE {was} to {now} {shown(0.0, own)[1]}"
@@ -291,6 +287,7 @@ def residual_section(details: Mapping[str, Any], errors: Table) -> Section:
     )
     gallery = Gallery(tuple(figures), "Measured minus simulated", "residuals")
     note = records_note(len(figures), details["n_records"])
+    errors = error_table("Errors of each record", ["record", "role", "model"], rows, unit, note)
     return Section("Residual of each record", (gallery, errors), text + note)
 
 
