@@ -34,8 +34,7 @@ NOT_TRACED = (
     "test_a_mistake_is_named", "test_a_right_campaign_is_not_accused", "test_right_campaigns_are_not_accused",
     "test_holdout_records_decide_nothing", "test_the_advised_record_tells_apart_and_beats_a_random_one",
     "test_finds_on_one_stroke_what_the_paper_found", "test_another_form_of_an_effect_takes_its_place",
-    "test_two_effects_are_found_together", "test_a_fault_of_one_record_is_told_beside_an_effect",
-    "test_a_fault_that_held_out_records_deny_is_gone_whole",
+    "test_a_fault_of_one_record_is_told_beside_an_effect", "test_a_fault_that_held_out_records_deny_is_gone_whole",
 )  # fmt: skip
 # Those that take longest come first, so that two processes end together.
 LONGEST = (

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import inf, isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -56,27 +56,12 @@ WITHOUT_RESIDUALS = "cmaes"
 PAPER_IDENTIFIER, PAPER_FITNESS, PAPER_BUDGET, PAPER_WINDOW = "pso", "similarity", 12_000, (0.0, 0.7)
 
 
-class Opened(NamedTuple):
-    """What a call on a campaign works with; bounds and fixed as they were given, SI."""
-
-    registry: Registry
-    campaign: Campaign
-    model: Model
-    bounds: Bounds
-    fixed: Mapping[str, float]
-
-    def space(self) -> "Space":
-        from armid.problem.space import space_of
-
-        return space_of(self.model, self.campaign.parameters, self.bounds, self.fixed)
-
-
 def opened(
     campaign: Any, effects: Named = (), plugins: Iterable[str] = (), window: Window | None = None,
     bounds: Bounds | None = None, fix: Mapping[str, float] | None = None, plant: str | Plant | None = None,
     model: Model | None = None, units: str | None = None,
-) -> Opened:  # fmt: skip
-    """Return the campaign, effects and overrides that the arguments name; model: used instead of the declared one."""
+) -> tuple[Registry, Campaign, Model]:  # fmt: skip
+    """Return catalogues, campaign and model that the arguments name; model: used instead of the declared one."""
     refuse_others(effects, plugins, window, bounds, fix)
     registry = load_registry(plugins)
     if isinstance(plant, Plant):
@@ -96,7 +81,7 @@ def opened(
     for effect in each_of(effects):
         model = model + effect_of(effect, effects_known, read.plant)
     warn_of_far(fix or {}, bounds or {}, model)
-    return Opened(registry, read, model, dict(bounds or {}), dict(fix or {}))
+    return registry, read, model
 
 
 def refuse_others(effects: Any, plugins: Any, window: Any, bounds: Any, fix: Any) -> None:
@@ -244,28 +229,29 @@ def identify(
     from armid.estimation.data_checks import data_issues
     from armid.estimation.identify import identify as run
     from armid.problem.fitness import as_fitness, fitness_of_name
+    from armid.problem.space import space_of
 
     if not isinstance(options or {}, Mapping):
         raise ArmidError(f"options is {quoted(options)}: name -> value is expected")
     window = PAPER_WINDOW if paper and window is None else window
-    setup = opened(campaign, effects, plugins, window, bounds, fix, plant, model, units)
+    registry, read, composed = opened(campaign, effects, plugins, window, bounds, fix, plant, model, units)
     fitness = fitness or (PAPER_FITNESS if paper else USUAL_FITNESS)
-    distance = (fitness_of_name(fitness, setup.registry.fitness) if isinstance(fitness, str) else
+    distance = (fitness_of_name(fitness, registry.fitness) if isinstance(fitness, str) else
                 as_fitness(name_of(fitness, getattr(fitness, "__name__", "own")), fitness))  # fmt: skip
     by_default = PAPER_IDENTIFIER if paper else IDENTIFIER if distance.weigh is not None else WITHOUT_RESIDUALS
-    searcher = identifier_of(identifier or by_default, setup.registry).with_options(options or {})
+    searcher = identifier_of(identifier or by_default, registry).with_options(options or {})
     if budget is None:
         budget = PAPER_BUDGET if paper or identifier is not None else USUAL_BUDGET
-    space = space or setup.space()
-    with angles_in(setup.campaign.angle):
-        issues = data_issues(setup.campaign, setup.model, space)
+    space = space or space_of(composed, read.parameters, bounds, fix)
+    with angles_in(read.angle):
+        issues = data_issues(read, composed, space)
     with warned_once(UserWarning):
         for issue in issues:
             warnings.warn(issue.sentence, stacklevel=2)
     with search_bar(progress is True) as shown:
         followed = progress if callable(progress) else shown
         identification = run(
-            setup.campaign, setup.model, space, distance, searcher, budget, seed, target, accuracy, followed, interval
+            read, composed, space, distance, searcher, budget, seed, target, accuracy, followed, interval
         )
     return replace(identification, issues=issues)
 
@@ -311,12 +297,13 @@ def examine(
         It prints itself; `table`, `plot()`, `to_dict()`, `save(folder)`.
     """
     from armid.estimation.examine import examine as run
+    from armid.problem.space import space_of
 
-    setup = opened(campaign, effects, plugins, window, bounds, fix, plant, model, units)
-    box = space or setup.space()
+    _, read, composed = opened(campaign, effects, plugins, window, bounds, fix, plant, model, units)
+    box = space or space_of(composed, read.parameters, bounds, fix)
     at = free_values(box, x, where) if isinstance(x, Mapping) else x if x is None else np.asarray(x, dtype=np.float64)
     with status_line(progress) as show:
-        return run(setup.campaign, setup.model, box, at, noise, by, accuracy, show)
+        return run(read, composed, box, at, noise, by, accuracy, show)
 
 
 def free_values(space: "Space", given: Mapping[str, float], where: str) -> Array:
@@ -382,13 +369,14 @@ def close_loop(
     if isinstance(model, Model) != (campaign is not None):
         raise ArmidError("a Model and its campaign, or a campaign alone, is expected")
     declared = model if isinstance(model, Model) else None
-    setup = opened(campaign if declared else model, effects, plugins, window, bounds, fix, plant, declared, units)
-    known = setup.registry.effects_for(setup.campaign.plant)
+    given = campaign if declared else model
+    registry, read, composed = opened(given, effects, plugins, window, bounds, fix, plant, declared, units)
+    known = registry.effects_for(read.plant)
     wanted = candidates if isinstance(candidates, Mapping) else effects_of(candidates, known, "candidates")
     left_out = effects_of(without, known, "without") if without else {}
     kept = {name: effect for name, effect in wanted.items() if name not in left_out}
-    own = setup.registry.own["effects"] if candidates is None else kept
-    refusals = {name: [refusal_of(form, setup.model.plant) for form in kept[name].every_form]
+    own = registry.own["effects"] if candidates is None else kept
+    refusals = {name: [refusal_of(form, composed.plant) for form in kept[name].every_form]
                 for name in kept if name in own}  # fmt: skip
     refused = {name: reasons[0] for name, reasons in refusals.items() if all(reasons)}
     if candidates is not None and refused.keys() == kept.keys() != set():
@@ -397,15 +385,15 @@ def close_loop(
         )
     for name, reason in refused.items():
         warnings.warn(f"effect '{name}' is not looked for: {reason}", stacklevel=2)
-    values = {**(fixed or {}), **setup.fixed}
+    values = {**(fixed or {}), **(fix or {})}
     chances = {name: float(p) for name, p in (priors or {}).items() if not isinstance(p, Sequence)}
-    known_too = with_known(setup.campaign, {name: p for name, p in (priors or {}).items() if name not in chances})
+    known_too = with_known(read, {name: p for name, p in (priors or {}).items() if name not in chances})
     if within is not None and not (isfinite(within) and within > 0.0):
         raise ArmidError(f"within is {within:g}: a number above 0 is expected")
     share = {} if within is None else {"within": within}
     file = progress if isinstance(progress, Path) else None
     with status_line(progress is True) as shown, angles_in(known_too.angle):
-        loop: ClosedLoop = run(setup.model, known_too, kept, rng, setup.bounds, values, threads, told or shown, curve,
+        loop: ClosedLoop = run(composed, known_too, kept, rng, bounds, values, threads, told or shown, curve,
                                file, chances, **share)  # fmt: skip
     return loop
 
@@ -465,21 +453,20 @@ def simulate(
     from armid.engine import simulate as run
     from armid.problem.simulated import SimulatedCampaign, candidate_of, simulated_table
 
-    of_model = (manoeuvre, population, schedule)
     if isinstance(model, Model):
         if accuracy is not None or parameters is not None or values:
             raise ArmidError("accuracy or parameters are given with a Model: a schedule and a population are expected")
         if manoeuvre is None or population is None:
             raise ArmidError("a Model is given alone: a manoeuvre and a population are expected with it")
         return run(model, manoeuvre, population, schedule or Schedule(), threads, states)
-    if any(given is not None for given in of_model):
+    if any(given is not None for given in (manoeuvre, population, schedule)):
         raise ArmidError("a manoeuvre is given with a campaign: with a Model it is expected")
-    setup = opened(model, effects, plugins, window, plant=plant)
-    declared = replace(setup.model, plant=setup.campaign.declared)
+    _, read, composed = opened(model, effects, plugins, window, plant=plant)
+    declared = replace(composed, plant=read.declared)
     asked = {**values, **(parameters or {})}
-    candidate = candidate_of(declared, setup.campaign, asked)
+    candidate = candidate_of(declared, read, asked)
     with warned_once(UserWarning):
-        tables = {r.file: simulated_table(r, declared, candidate, accuracy) for r in setup.campaign.records}
+        tables = {r.file: simulated_table(r, declared, candidate, accuracy) for r in read.records}
     for name, value in asked.items():
         warn_if_far(declared.parameters[name], [value], f"{name} = {value:g}")
-    return SimulatedCampaign(setup.campaign, declared, candidate, tables)
+    return SimulatedCampaign(read, declared, candidate, tables)

@@ -35,9 +35,6 @@ def together(change_of):
 MISTAKES = {
     "angle inverted": (write_arm, (everywhere(ANGLE, np.negative),), r"every.*rad signal: its sign"),
     "angle in rad": (write_arm, (everywhere(ANGLE, np.deg2rad),), "every.*radians under a header in deg"),
-    "drive inverted": (write_arm, (everywhere(DRIVE, np.negative),), "every.*input 'u': its sign"),
-    "noise": (write_arm, (change(ANGLE, lambda x: np.random.default_rng(3).normal(0.0, 20.0, x.size), "b.csv"),),
-              r"b\.csv: the measured angle is noise"),
     "horizontal": (write_arm, (everywhere(ANGLE, lambda x: x + 90.0),), "every.*from elsewhere: with -90"),
     "of two, speed inverted": (both, (everywhere(SPEED, np.negative),), r"every.*velocity \[rad/s\]: its sign"),
     "of two, angle inverted": (both, (everywhere(ANGLE, np.negative),), r"every.*angle \[rad\]: its sign"),
@@ -46,12 +43,10 @@ MISTAKES = {
     "mm": (write_axis, (everywhere("velocity_m_s", lambda v: 1000.0 * v),), r"a\.csv: position_m moves 0\.001 times"),
     "hub inverted": (write_link, (everywhere(HUB, np.negative),), r"every.*hub_angle \[rad\]: its sign"),
     "deflection inverted once": (write_link, (change(TWIST, np.negative, "b.csv"),), r"b\.csv.*deflection.*: its sign"),
-    "thousandths": (write_link, (everywhere(TWIST, lambda x: 1000.0 * x),), "every.*1,000 times too (large|small)"),
     "exchanged": (write_link, (together(lambda hub, twist: (twist, hub)),), "hub_angle and deflection look exchanged"),
     "absolute": (write_link, (together(lambda hub, twist: (hub, hub + twist)),), "deflection looks counted from"),
     "drive late": (write_link, (change(DRIVE, lambda u: np.concatenate([np.full(12, u[0]), u[:-12]]), "a.csv"),),
                    r"a\.csv: its clock looks 0\.(09|1)\d* s early"),
-    "of two, ms once": (both, (change("time_s", lambda t: 1000 * t, "b.csv"),), r"b\.csv: time_s looks like milli"),
     "deflection in rad": (
         write_link, (everywhere(TWIST, np.deg2rad),), r"every.*deflection \[rad\]: 57\.3 times too small"),
 }  # fmt: skip

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from linear_records import linear_records
 from scipy.optimize import least_squares, lsq_linear
+from scipy.signal import lfilter
 from scipy.stats import chi2
 
 from armid.engine import Schedule
@@ -104,10 +105,7 @@ def test_what_probes_elsewhere_lose_in_the_engine_hides_no_misfit(lowering_repla
 
 def drawn(rng, n_samples, phi):
     """Return noise of rms NOISE with correlation phi from sample to sample."""
-    white = rng.normal(0.0, NOISE * np.sqrt(1.0 - phi**2), n_samples + 200)
-    for i in range(1, white.size):
-        white[i] += phi * white[i - 1]
-    return white[200:]
+    return lfilter([1.0], [1.0, -phi], rng.normal(0.0, NOISE * np.sqrt(1.0 - phi**2), n_samples + 200))[200:]
 
 
 @pytest.mark.parametrize("phi", [0.0, 0.7])

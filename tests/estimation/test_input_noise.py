@@ -13,7 +13,7 @@ from armid.loop import report_of
 from armid.loop.document import error_sentence
 from armid.model import Model
 from armid.record.sensor import InputNoise, noise_of_input
-from synthetic import write_records
+from synthetic import wheel, write_records
 
 INERTIA, DAMPING, INTERVAL, SPEED_NOISE, TORQUE_NOISE = 0.05, 0.03, 0.01, 0.005, 0.02
 TIMES = INTERVAL * np.arange(800)
@@ -36,12 +36,7 @@ def torque(seed):
 
 
 def speed(drive):
-    """Exact over each interval in which the torque stays."""
-    kept = np.exp(-DAMPING * INTERVAL / INERTIA)
-    moved = [0.0]
-    for u in drive[:-1]:
-        moved.append(kept * moved[-1] + (1.0 - kept) * u / DAMPING)
-    return np.array(moved)
+    return wheel(drive, INTERVAL, 1.0 / INERTIA, DAMPING / INERTIA)[0]
 
 
 def campaign(folder, measured, driven=torque):

@@ -72,7 +72,7 @@ def test_a_dead_time_is_no_lag_and_a_lag_no_dead_time(fitted):
     space, ready, _ = fitted
     truth = Model(winch) + EFFECTS["viscous"] + EFFECTS["drive_lag"].in_form("voltage")
     lagging = space_of(truth)
-    lagged = tuple(r for r in replays([r.record for r in ready], truth, lagging))
+    lagged = replays([r.record for r in ready], truth, lagging)
     values = lagging.complete(np.array([[DRUM, FRICTION, DELAY]]))
     rng = np.random.default_rng(4)
     left = {}

@@ -10,7 +10,7 @@ import armid
 from armid.inference.carry_over import Missed, late
 from armid.loop.document import conclusion
 from armid.model import PLANTS
-from synthetic import write_records
+from synthetic import wheel, write_records
 
 pytestmark = pytest.mark.slow
 STEP, N, INERTIA, FRICTION = 0.01, 600, 0.02, 0.05
@@ -29,10 +29,8 @@ def table(amplitude, seed, inertia=INERTIA, most=np.inf):
     """Return a record of a motor whose drive gives no more than some effort; exact between samples."""
     rng = np.random.default_rng(seed)
     drive = np.repeat(amplitude * rng.choice([-1.0, -0.4, 0.4, 1.0], N // 20), 20)
-    keeps, speed = np.exp(-FRICTION * STEP / inertia), [0.0]
-    for effort in np.clip(drive, -most, most)[:-1]:
-        speed.append(keeps * speed[-1] + (1.0 - keeps) * effort / FRICTION)
-    measured = np.array(speed) + 0.02 * rng.standard_normal(N)
+    speed, _ = wheel(np.clip(drive, -most, most), STEP, 1.0 / inertia, FRICTION / inertia)
+    measured = speed + 0.02 * rng.standard_normal(N)
     return {"time_s": STEP * np.arange(N), "angular_velocity_rad_s": measured, "drive_V": drive}
 
 

@@ -117,7 +117,7 @@ def test_a_parameter_that_rises_from_record_to_record_is_told(stand, campaign):
     assert suspect["high"] - suspect["low"] < 0.1 * rise
     assert (found.verdict, found.effects) == ("record_disagrees", ())
     assert conclusion(found).startswith("p0 is 0.09")
-    assert found.after.train_error.rmse < 1.05 * found.noise_rms
+    assert found.after.train.errors.rmse < 1.05 * found.noise_rms
     for e in found.after.estimates[:4]:
         assert e.low < TRUTH[e.name] < e.high
 
@@ -154,7 +154,7 @@ def test_broken_samples_weigh_nothing(campaign, sound, tmp_path):
     assert found.verdict == "no_discrepancy"
     for a, b in zip(found.after.estimates, sound.after.estimates, strict=True):
         assert a.value == pytest.approx(b.value, rel=1e-3)
-    assert found.after.train_error.rmse == pytest.approx(sound.after.train_error.rmse, rel=0.01)
+    assert found.after.train.errors.rmse == pytest.approx(sound.after.train.errors.rmse, rel=0.01)
 
 
 def test_hum_is_noise(campaign, sound):

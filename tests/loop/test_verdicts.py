@@ -84,7 +84,7 @@ def test_any_output_that_is_held_out_may_deny(speed, is_denied_then):
 
 
 def step(name, claimed, p=1.0):
-    return Step(name, "torque", (), False, claimed, p, None)
+    return Step(name, "torque", (), claimed, p, None)
 
 
 SURE, UNSURE = step("viscous", True), step("coulomb", False, 0.5)
@@ -178,7 +178,7 @@ def test_a_name_is_claimed_that_is_probable_and_whose_fit_is_settled(p, at_a_lim
     object.__setattr__(inference, "exploration", SimpleNamespace(library=library, fits={model: fit}))
     after = Judgement(fit, None, (), None, None)
     (only,) = steps_of(inference, [frozenset(), model], [None, after], lambda *_: {})
-    assert (only.effect, only.port, only.claimed, only.empirical) == ("viscous", "torque, inertia", claimed, False)
+    assert (only.effect, only.port, only.claimed) == ("viscous", "torque, inertia", claimed)
     assert only.probability == pytest.approx(p)
     assert only.alternatives == (("coulomb",) if p < 0.99 else ())
     # a model of faults alone is not a step

@@ -7,14 +7,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from armid.problem.fitness import (  # fmt: skip
-    FITNESS,
-    Fitness,
-    as_fitness,
-    chi_square,
-    record_weights,
-    relative_mean_square,
-)
+from armid.problem.fitness import FITNESS, Fitness, as_fitness, chi_square, relative_mean_square
 from commands import refusing
 
 OF_RECORD = {"interval": 0.001, "noise": 0.2}
@@ -83,9 +76,6 @@ def test_refuses_noise_that_is_none_a_measurement_of_zero_and_an_unknown_join():
         relative_mean_square(np.zeros(3), np.ones((1, 3)))
     with pytest.raises(ValueError, match="joins records by 'durations', did you mean 'duration'"):
         Fitness("mine", lambda measured, simulated: 0, join="durations")
-    for weights in ((1.0, 0.0), (1.0, np.nan)):
-        with pytest.raises(ValueError, match="weighs records"):
-            record_weights(FITNESS["rmse"], (1.0, 1.0), weights)
 
 
 def noisy():

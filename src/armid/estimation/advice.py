@@ -17,7 +17,7 @@ from scipy.special import ndtr, ndtri, softmax, xlogy
 
 from armid.engine import probes, simulate
 from armid.errors import ArmidError
-from armid.estimation.design import BOX, Feasible, Key, Motions, fine_schedule, manoeuvre_grid
+from armid.estimation.design import BOX, Feasible, Key, Motions, fine_schedule
 from armid.estimation.least_squares import LeastSquaresProblem, descend, side_by_side
 from armid.model import Array
 
@@ -114,7 +114,7 @@ NewSignals = Callable[[Rival, Array], Array]
 def advise(
     rivals: Sequence[Rival],
     white: Whitening,
-    grid: Sequence[Feasible] | None = None,
+    grid: Sequence[Feasible],
     speed_limit: float | None = None,
     threads: int = 1,
 ) -> tuple[Advice, ...]:
@@ -122,18 +122,16 @@ def advise(
 
     Only manoeuvres that were simulated are returned, ranked by their gain, then by the mean distance.
     rivals: two or more, fitted to the same records. white: turns signals of a new record, (n_outputs, n_signals,
-    n_samples), into units of white noise, (n_signals, n). grid: with the constants as declared; None: `manoeuvre_grid`
-    of the records of the first rival. speed_limit: of the gyro.
+    n_samples), into units of white noise, (n_signals, n). grid: with the constants as declared. speed_limit: of the
+    gyro.
     """
     if len(rivals) < 2:
         raise ArmidError(f"{len(rivals)} model was given: at least two are expected")
-    first = rivals[0].records
-    grid = grid or manoeuvre_grid(first.model, [r.record for r in first.replays])
     predictions = side_by_side(lambda rival: predictions_of(rival, grid, white, speed_limit), rivals, threads)
     draws = normal_draws(1 + sum(len(r.z) for r in rivals), N_DRAWS)
     possible = [f for f in grid if all(f in known for known in predictions)]
     powers = {f: predicted_powers(rivals, [p[f] for p in predictions], draws) for f in possible}
-    fits = int(MOST_FITS * min(OF_SAMPLES / len(first.measured), 1.0))
+    fits = int(MOST_FITS * min(OF_SAMPLES / len(rivals[0].records.measured), 1.0))
     most = max(fits // (len(rivals) ** 2 * N_REFIT_DRAWS), FEWEST_SIMULATED)
     promising = sorted(possible, key=lambda f: rank(mean_of(powers[f], 0), powers[f]), reverse=True)[:most]
     draws = normal_draws(max(len(r.z) for r in rivals), N_REFIT_DRAWS)

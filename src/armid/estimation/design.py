@@ -14,7 +14,7 @@ from armid.estimation.information import inverse
 from armid.estimation.least_squares import slopes_of, stencil
 from armid.estimation.noise_model import Level
 from armid.model import Array, Manoeuvre, ManoeuvreKey, Model, Plant
-from armid.problem.problem import Replay
+from armid.problem.problem import Replay, by_output
 from armid.problem.space import Space
 from armid.record import Record
 
@@ -120,10 +120,9 @@ def gain(fisher: Array, more: Array, by: str) -> float:
 
 def expected_levels(replays: Sequence[Replay], levels: Sequence[Level]) -> tuple[Level, ...]:
     """Return the level to expect of each output: mean square, mean share of independent samples."""
-    places = sorted({r.place for r in replays})
-    groups = [[level for r, level in zip(replays, levels, strict=True) if r.place == place] for place in places]
     return tuple(Level(float(np.sqrt(np.mean([level.rms**2 for level in group]))),
-                       float(np.mean([level.effective_fraction for level in group]))) for group in groups)  # fmt: skip
+                       float(np.mean([level.effective_fraction for level in group])))
+                 for group in by_output(replays, levels).values())  # fmt: skip
 
 
 def manoeuvre_grid(model: Model, records: Sequence[Record]) -> tuple[Feasible, ...]:
@@ -289,9 +288,8 @@ class Motions:
         self.schedule = fine_schedule(replays)
         self.candidate = candidate
         self.speed_limit = np.inf if speed_limit is None else speed_limit
-        self.places = sorted({r.place for r in replays})
-        rms = [(r.place, float(np.sqrt(np.mean(r.measured**2)))) for r in replays]
-        self.slowest = [MOVED_AT_LEAST * max(size for p, size in rms if p == place) for place in self.places]
+        sizes = by_output(replays, [float(np.sqrt(np.mean(r.measured**2))) for r in replays])
+        self.places, self.slowest = list(sizes), [MOVED_AT_LEAST * max(of_output) for of_output in sizes.values()]
         self.travel = key_travel(self.model.plant)
         self.extents = self._recorded_extents(replays) if self.model.plant.inputs else {}
 

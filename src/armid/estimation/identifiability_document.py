@@ -81,13 +81,12 @@ def answer_and_remarks(result: Mapping[str, Any]) -> tuple[tuple[str, ...], tupl
     bounded, by_others, unbounded = list[str](), list[str](), list[str]()
     for name, p in result["parameters"].items():
         deviation = deviation_text(name, p, p["deviation"])
-        if p["profile"]["bounded_low"] and p["profile"]["bounded_high"]:
-            if deviation == UNDETERMINED:
-                by_others.append(name)
-            else:
-                bounded.append(f"{name} ({deviation})")
-        else:
+        if not (p["profile"]["bounded_low"] and p["profile"]["bounded_high"]):
             unbounded.append(name)
+        elif deviation == UNDETERMINED:
+            by_others.append(name)
+        else:
+            bounded.append(f"{name} ({deviation})")
     said = [f"Bounded on both sides at 95 %, with this standard deviation: {', '.join(bounded)}."] if bounded else []
     said += [f"Bounded by the limits of other parameters alone: {', '.join(by_others)}."] if by_others else []
     said += [f"Not bounded on both sides: {', '.join(unbounded)}."] if unbounded else []
@@ -136,11 +135,9 @@ def deviation_text(name: str, p: Mapping[str, Any], deviation: float | None) -> 
 
 def offer_table(result: Mapping[str, Any]) -> Table:
     """Return the best offers: manoeuvre, deviation of each parameter after one such record; the best repeat is last."""
-    names, offers = list(result["parameters"]), result["offers"]
-    if len(names) > MOST_COLUMNS:
-        names = most_helped(names, offers)
-    n_all = len(result["parameters"])
-    some = "" if len(names) == n_all else f", {len(names)} of {n_all} parameters"
+    every, offers = list(result["parameters"]), result["offers"]
+    names = every if len(every) <= MOST_COLUMNS else most_helped(every, offers)
+    some = "" if names == every else f", {len(names)} of {len(every)} parameters"
     repeats = [offer for offer in offers[MOST_OFFERS:] if " once more" in offer["words"]][:1]
     entries = {name: result["parameters"][name] for name in names}
     rows = [("none", *(deviation_text(name, p, p["deviation"]) for name, p in entries.items()), 1.0)]

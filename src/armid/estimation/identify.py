@@ -27,6 +27,7 @@ from armid.problem.meter import BudgetIgnoredError, Meter
 from armid.problem.problem import (
     IdentificationProblem,
     Replay,
+    by_output,
     fitness_of,
     judged_by,
     output_sizes,
@@ -402,8 +403,8 @@ def record_errors(replay: Replay, candidate: Array) -> Errors:
 
 def campaign_errors(replays: Sequence[Replay], candidate: Array) -> JointErrors:
     plant = replays[0].model.plant
-    groups = [(o, [r for r in replays if r.place == i]) for i, o in enumerate(plant.outputs)]
-    outputs = {o.name: output_errors(group, candidate) for o, group in groups if group}
+    groups = by_output(replays, replays)
+    outputs = {plant.outputs[place].name: output_errors(group, candidate) for place, group in groups.items()}
     joint = float(np.sqrt(np.mean([(e.rmse / e.span) ** 2 for e in outputs.values()])))
     absent = Errors(np.nan, np.nan, None, np.nan, np.nan, np.nan, plant.outputs[0].unit)
     return JointErrors(**vars(outputs.get(plant.outputs[0].name, absent)), joint_nrmse=joint, outputs=outputs)
@@ -434,11 +435,10 @@ def entries_of_noise(replays: Sequence[Replay], noise: Sequence[float], candidat
 
     noise: of each replay, its unit.
     """
-    levels = [(o, [rms for r, rms in zip(replays, noise, strict=True) if r.place == i])
-              for i, o in enumerate(replays[0].model.plant.outputs)]  # fmt: skip
-    moved = moved_by_inputs(replays, candidate)
+    outputs, moved = replays[0].model.plant.outputs, moved_by_inputs(replays, candidate)
+    levels = [(outputs[place], rms) for place, rms in by_output(replays, noise).items()]
     return {o.name: {"unit": o.unit, "noise_rms": float(np.mean(rms)), "moved_by_inputs": moved.get(o.name, 0.0)}
-            for o, rms in levels if rms}  # fmt: skip
+            for o, rms in levels}  # fmt: skip
 
 
 def errors_by_file(replays: Sequence[Replay], candidate: Array) -> dict[str, JointErrors]:

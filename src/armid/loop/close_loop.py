@@ -21,7 +21,7 @@ from armid.inference.checks import holdout_residuals, is_significant, train_resi
 from armid.inference.decisions import CLAIMED, DENIED, MENTIONED, OVER_NOISE, WINDOW, WITHIN
 from armid.inference.hypothesis import Hypotheses, Hypothesis, words
 from armid.inference.infer import Inference, infer, prepared
-from armid.inference.kinds.missing_signal import Missing, missing_from
+from armid.inference.kinds.missing_signal import missing_from
 from armid.inference.library import Library, calibrated_replays
 from armid.inference.model import (
     Fit,
@@ -35,16 +35,8 @@ from armid.inference.model import (
 from armid.inference.moves import Exploration, constants_instead, without
 from armid.inference.whitening import WhiteRecords
 from armid.loop.result import (
-    CARRIES_NOT,
-    DISAGREES,
-    EXPLAINED,
     HELD,
-    IMPLAUSIBLE,
     INSTEAD,
-    NO_DISCREPANCY,
-    PARTLY,
-    TOO_ALIKE,
-    UNEXPLAINED,
     ClosedLoop,
     Judgement,
     Step,
@@ -54,6 +46,7 @@ from armid.loop.result import (
     record_faults_of,
 )
 from armid.model import Array, Effect, Model
+from armid.problem.problem import by_output
 from armid.problem.starts import with_starts
 from armid.record import Campaign, Record
 from armid.units import behind
@@ -149,38 +142,42 @@ def close_loop(
         inference, path = inference.without(path[-1] - path[kept], path[kept]), path[: kept + 1]
         judged = rejudged(inference, path, judged, within)
         steps = steps_of(inference, path, judged, instead)
-    after, before = judged[kept], judged[0]
+    after = judged[kept]
     accused = [h for h in path[kept] if inference.posterior.probability(*h.public) >= MENTIONED]
     suspects = [*record_faults_of(accused, path[kept], inference), *broken_records(campaign.records)]
     verdicts = (
-        (IMPLAUSIBLE, UNEXPLAINED) if implausible else verdicts_of(inference, accused, after, steps[:kept], withdrawn)
-    )
+        ("implausible_records", "unexplained") if implausible
+        else verdicts_of(inference, accused, after, steps[:kept], withdrawn)
+    )  # fmt: skip
     if after.fails_to_carry_over:  # nothing is claimed that held-out records deny
         assert after.holdout is not None
         inference = inference.after_holdout(over_noise(after.train, after.holdout))
         judged = rejudged(inference, path, judged, within)
-        after, before = judged[kept], judged[0]
-        steps = steps_of(inference, path, judged, instead)
-        steps = tuple(replace(step, claimed=False) for step in steps)
+        after = judged[kept]
+        steps = tuple(replace(step, claimed=False) for step in steps_of(inference, path, judged, instead))
     if any(step.instead for step in steps[:kept]):
         after = doubted(after, INSTEAD)
     errors = {
         name: [errors_on(records, j, library) for records in (campaign.train, campaign.holdout)] if suspects else
-        [j.train_error, j.holdout_error] for name, j in (("before", before), ("after", after))
+        [None if seen is None else seen.errors for seen in (j.train, j.holdout)]
+        for name, j in (("before", judged[0]), ("after", after))
     }  # fmt: skip
-    in_force = inference.exploration.fits[path[kept]]
-    missing = missing_of(in_force, inference.exploration.library, told) if curve and not implausible else None
-    advice = advice_on(inference, campaign.gyro_range, threads, told) if TOO_ALIKE in verdicts else ()
+    in_force, missing = inference.exploration.fits[path[kept]], None
+    if curve and not implausible and is_significant(in_force):
+        told("recovering the missing signal without a form")
+        missing = missing_from(in_force, inference.exploration.library)
+    advice = advice_on(inference, campaign.gyro_range, threads, told) if "cannot_tell_apart" in verdicts else ()
     # Other issues rest on the declared model: they are reported where nothing better was found.
-    at_a_loss = not {UNEXPLAINED, CARRIES_NOT, PARTLY}.isdisjoint(verdicts) and not any(s.claimed for s in steps)
-    issues = (*issues, *given_twice(campaign.records))
-    told_first = dict.fromkeys(s.sentence for s in issues if s.kind in TOLD or (at_a_loss and s.kind != "unjudged"))
+    is_lacking = {"unexplained", "does_not_carry_over", "partly_explained"} & {*verdicts}
+    at_a_loss = is_lacking and not any(s.claimed for s in steps)
+    told_first = dict.fromkeys(s.sentence for s in (*issues, *given_twice(campaign.records))
+                               if s.kind in TOLD or (at_a_loss and s.kind != "unjudged"))  # fmt: skip
     again = [f"Record {s.record} once more, or look at how it was made." for s in suspects if s.kind != "trend"]
     doubt = [] if after.fails_to_carry_over else in_doubt_sentences(after.train, after.holdout)
     next_steps = (*told_first, *missed_sentences(after.missed), *doubt, *limits_of(after), *dict.fromkeys(again))
-    return ClosedLoop(campaign, verdicts[0], verdicts[1:], before, after, steps[:kept], withdrawn, advice, next_steps,
-                      known_together(in_force, inference.exploration.library), tuple(suspects), errors, inference,
-                      missing)  # fmt: skip
+    together = known_together(in_force, inference.exploration.library)
+    return ClosedLoop(campaign, verdicts[0], verdicts[1:], judged[0], after, steps[:kept], withdrawn, advice,
+                      next_steps, together, tuple(suspects), errors, inference, missing)  # fmt: skip
 
 
 def doubted(judged: Judgement, why: str) -> Judgement:
@@ -257,7 +254,7 @@ def steps_of(
         port = ", ".join(candidates[hypothesis.means].adds)
         constants = instead(exploration, inference.in_force, hypothesis)
         is_claimed = p >= CLAIMED and settled and not constants
-        steps.append(Step(hypothesis.name, port, names, False, is_claimed, p, after, hypothesis.form, constants))
+        steps.append(Step(hypothesis.name, port, names, is_claimed, p, after, hypothesis.form, constants))
     return tuple(steps)
 
 
@@ -291,13 +288,14 @@ def verdicts_of(
     """Return the verdicts that hold, each in one word, the most important first."""
     post = inference.posterior
     unknown = post.unknown_is_likely
-    verdicts = [CARRIES_NOT] if withdrawn is not None or after.fails_to_carry_over else []
-    verdicts += [DISAGREES] if any(h.kind in ("record", "drift") for h in accused) else []
+    verdicts = ["does_not_carry_over"] if withdrawn is not None or after.fails_to_carry_over else []
+    verdicts += ["record_disagrees"] if any(h.kind in ("record", "drift") for h in accused) else []
     in_doubt = any(s.probability < CLAIMED or s.instead for s in steps) if steps else post.nothing < MENTIONED
-    verdicts += [TOO_ALIKE] if in_doubt and not unknown and withdrawn is None and DISAGREES not in verdicts else []
+    if in_doubt and not unknown and withdrawn is None and "record_disagrees" not in verdicts:
+        verdicts.append("cannot_tell_apart")
     if unknown:
-        verdicts.append(PARTLY if steps else UNEXPLAINED)
-    return tuple(verdicts) or (EXPLAINED if steps else NO_DISCREPANCY,)
+        verdicts.append("partly_explained" if steps else "unexplained")
+    return tuple(verdicts) or ("explained" if steps else "no_discrepancy",)
 
 
 def limits_of(judged: Judgement) -> list[str]:
@@ -305,14 +303,6 @@ def limits_of(judged: Judgement) -> list[str]:
     held = [e for e in judged.estimates if HELD in e.doubts and e.value]
     return [f"{e.name} sits at its limit {e.value:.4g}{behind(e.unit)}: widen it (--bounds "
             f"{e.name}=LOW:HIGH), or fix it." for e in held]  # fmt: skip
-
-
-def missing_of(fit: Fit, library: Library, told: Callable[[str], None]) -> Missing | None:
-    """Return the signal that a model lacks where it leaves more than noise."""
-    if not is_significant(fit):
-        return None
-    told("recovering the missing signal without a form")
-    return missing_from(fit, library)
 
 
 def errors_on(records: tuple[Record, ...], judged: Judgement, library: Library) -> JointErrors | None:
@@ -336,13 +326,11 @@ def advice_on(
         return ()
     say(f"looking for a manoeuvre that tells {' and '.join(r.name for r in rivals)} apart")
     best = inference.exploration.fits[inference.in_force]
-    replays, levels = best.records.replays, best.records.data.levels
     # of each output the first level, in the order in which `Motions.signals` gives them
-    known = dict(sorted(((r.place, level) for r, level in reversed([*zip(replays, levels, strict=True)])),
-                        key=lambda pair: pair[0]))  # fmt: skip
+    known = [levels[0] for levels in by_output(best.records.replays, best.records.data.levels).values()]
 
     def white(signals: Array) -> Array:
-        pairs = zip(known.values(), signals, strict=True)
+        pairs = zip(known, signals, strict=True)
         weight = float(np.sqrt(rivals[0].trust))
         return weight * np.concatenate([level.white(y, [y.shape[-1]]) for level, y in pairs], axis=-1)
 

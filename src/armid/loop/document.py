@@ -22,15 +22,7 @@ from armid.inference.model import Fit
 from armid.inference.posterior import UNSEEN
 from armid.loop.figures import figures_of, record_figure
 from armid.loop.result import (
-    CARRIES_NOT,
-    DISAGREES,
-    EXPLAINED,
-    IMPLAUSIBLE,
-    NO_DISCREPANCY,
-    PARTLY,
     REPORT_VERSION,
-    TOO_ALIKE,
-    UNEXPLAINED,
     ClosedLoop,
     Judgement,
     fault_sentence,
@@ -132,14 +124,11 @@ def loop_document(
             for model in ("before", "after")]  # fmt: skip
     errors = error_table("Errors", ["records", "model"], [row for row in both if row[-1] is not None], unit, ERROR_NOTE)
     parameters, chances = parameter_table(report), probability_table(report)
-    rows = [(r["record"], r["role"], model, r["error"][model]) for r in details["records"]
-            for model in ("before", "after")]  # fmt: skip
-    note = records_note(len(rows) // 2, details["n_records"])
-    by_record = error_table("Errors of each record", ["record", "role", "model"], rows, unit, note)
     steps: tuple[Part, ...] = (step_table(report),) if report["steps"] else ()
     steps += (Sentences((details["declared_by"],)),) if details.get("declared_by") else ()
     shifts = (*details["suspects"], *details["shifts"])
     together = tuple(f"{sentence[0].upper()}{sentence[1:]}." for sentence in report["known_together"])
+    wide = [f"{name}: {'; '.join(p['causes'])}." for name, p in report["parameters"]["after"].items() if p["causes"]]
     missing, words = tuple(details["missing"]), details["advice"]
     advice = tuple(advice_sentence(a, text) for a, text in zip(report["advice"][:1], words, strict=False))
     advice += tuple(report["next_steps"])
@@ -149,10 +138,10 @@ def loop_document(
         Section("What is missing", (chances, *drawn("probabilities", "intervals"))),
         Section("Error before and after", (errors,)),
         Section("Motion", drawn("motion")),
-        residual_section(details, by_record),
+        residual_section(details, unit),
         Section("Steps", steps or (Text("No effect was added."),)),
         Section("Parameters", (
-            parameters, *titled({"What makes the intervals wide": width_sentences(report), "": (*shifts, *together)}),
+            parameters, *titled({"What makes the intervals wide": wide, "": (*shifts, *together)}),
             *drawn("parameters"),
         )),
         Section("Is what remains noise?", (
@@ -209,9 +198,8 @@ def probability_table(report: Mapping[str, Any]) -> Table:
     """Return what may be missing, with its probability and what may stand in its place."""
     chances = report["probabilities"]
     others = {s["effect"]: ", ".join(s["alternatives"]) for s in report["steps"]}
-    rows = [(name, p, "effect", others.get(name, "")) for name, p in chances["effects"].items()]
-    rows += [(name, p, "one record", "") for name, p in chances["records"].items()]
-    rows += [(name, p, "drift from record to record", "") for name, p in chances["drifts"].items()]
+    kinds = {"effects": "effect", "records": "one record", "drifts": "drift from record to record"}
+    rows = [(name, p, kind, others.get(name, "")) for key, kind in kinds.items() for name, p in chances[key].items()]
     rows += [("something that the library does not hold", chances["unknown"], "", ""),
              ("nothing", chances["nothing"], "", "")]  # fmt: skip
     columns = ["what", Column("probability", "probability", ".2f"), "kind", "in its place"]
@@ -274,12 +262,6 @@ def parameter_table(report: Mapping[str, Any]) -> Table:
     return table("Parameters", ["parameter", "after", "of noise alone", "trusted", "before"], rows, note)
 
 
-def width_sentences(report: Mapping[str, Any]) -> tuple[str, ...]:
-    """Return what makes the interval of each parameter wide."""
-    after = report["parameters"]["after"]
-    return tuple(f"{name}: {'; '.join(p['causes'])}." for name, p in after.items() if p["causes"])
-
-
 def trust_text(p: Mapping[str, Any]) -> str:
     return "yes" if p["trusted"] else "not identified" if p["low"] is None else "no"
 
@@ -291,9 +273,10 @@ def text_of_noise_alone(p: Mapping[str, Any]) -> str:
     return f"{factor * p['noise_low']:.5g} to {factor * p['noise_high']:.5g}"
 
 
-def residual_section(details: Mapping[str, Any], errors: Table) -> Section:
-    figures = []
+def residual_section(details: Mapping[str, Any], unit: str) -> Section:
+    figures, rows = [], []
     for i, record in enumerate(details["records"]):
+        rows += [(record["record"], record["role"], model, record["error"][model]) for model in ("before", "after")]
         own = record["unit"]
         was, now = (rmse_text(record["error"][model], own) for model in ("before", "after"))
         title = f"{record['file']} ({record['role']}), RMSE {was} to {now} {shown(0.0, own)[1]}"
@@ -304,6 +287,7 @@ def residual_section(details: Mapping[str, Any], errors: Table) -> Section:
     )
     gallery = Gallery(tuple(figures), "Measured minus simulated", "residuals")
     note = records_note(len(figures), details["n_records"])
+    errors = error_table("Errors of each record", ["record", "role", "model"], rows, unit, note)
     return Section("Residual of each record", (gallery, errors), text + note)
 
 
@@ -354,7 +338,7 @@ def details_of(loop: ClosedLoop) -> dict[str, Any]:
         "headline": headline(loop),
         "conclusion": conclusion(loop),
         "shifts": (shift_sentences(before, after) if loop.steps else [])
-        + ([] if loop.verdict == NO_DISCREPANCY else constant_sentences(in_force)),
+        + ([] if loop.verdict == "no_discrepancy" else constant_sentences(in_force)),
         "doubts": doubt_sentences(after),
         "suspects": [fault_sentence(s) for s in loop.suspects],
         "declared_by": declared_by(loop),
@@ -389,14 +373,15 @@ def models_of(inference: Inference) -> list[dict[str, Any]]:
 def headline(loop: ClosedLoop) -> str:
     """Return the verdict in a few words."""
     stands = loop.withdrawn is not None and not loop.after.fails_to_carry_over
-    return "Withdrawn" if loop.verdict == CARRIES_NOT and stands else VERDICTS[loop.verdict]
+    return "Withdrawn" if loop.verdict == "does_not_carry_over" and stands else VERDICTS[loop.verdict]
 
 
 def conclusion(loop: ClosedLoop) -> str:
     """Return the verdict as one sentence."""
     sentence = {
-        IMPLAUSIBLE: implausible, DISAGREES: disagreeing_sentence, CARRIES_NOT: carried_sentence, TOO_ALIKE: doubtful,
-        NO_DISCREPANCY: nothing_missing, EXPLAINED: explained, PARTLY: partly, UNEXPLAINED: unexplained,
+        "implausible_records": implausible, "record_disagrees": disagreeing_sentence,
+        "does_not_carry_over": carried_sentence, "cannot_tell_apart": doubtful, "no_discrepancy": nothing_missing,
+        "explained": explained, "partly_explained": partly, "unexplained": unexplained,
     }  # fmt: skip
     return sentence[loop.verdict](loop)
 

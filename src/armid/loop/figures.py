@@ -298,14 +298,10 @@ def correlation(residuals: Residuals) -> Array:
 def missing_figure(loop: ClosedLoop, missing: Missing) -> Any:
     best = missing.dependences[0]
     variables = [best.variable, *(v for v in missing.segments[0].variables if v != best.variable)][:MOST_VARIABLES]
-    columns = (len(variables) + 2) // 2
-    size = (4.0 * columns, 6.4)
-    figure, axes = pyplot().subplots(2, columns, figsize=size, squeeze=False, layout="constrained")
-    share_panel(axes.flat[0], missing)
-    for axis, variable in zip(axes.flat[1:], variables, strict=False):
+    figure, axes = panels(1 + len(variables), (len(variables) + 2) // 2, 4.0, 3.2)
+    share_panel(axes[0], missing)
+    for axis, variable in zip(axes[1:], variables, strict=True):
         signal_panel(axis, missing, best, variable)
-    for axis in axes.flat[1 + len(variables) :]:
-        axis.set_axis_off()
     figure.suptitle(f"{loop.campaign.name}: the missing signal, recovered without a form at port {best.port}\n"
                     "(less what the free parameters can take up)", fontsize="medium")  # fmt: skip
     return figure

@@ -30,16 +30,18 @@ from armid.report.document import curve_entry, plain
 from armid.report.result import LOOP, Kind, Result
 from armid.units import behind, shown
 
-IMPLAUSIBLE, DISAGREES, CARRIES_NOT, NO_DISCREPANCY, EXPLAINED, PARTLY, UNEXPLAINED, TOO_ALIKE = (
-    "implausible_records", "record_disagrees", "does_not_carry_over", "no_discrepancy", "explained",
-    "partly_explained", "unexplained", "cannot_tell_apart",
-)  # fmt: skip
 # Doubts for which an interval does not hold.
 REMAINS, HELD = "a significant discrepancy remains", "it rests at its bound"
 # A shape that armid sets free by itself, such as the width of a sign: nobody needs to widen its range.
 SEARCHED = "it lies at the end of the range that was searched"
 NOT_IDENTIFIED = "it was not identified: its value is declared"
 INSTEAD = "a constant without a tolerance may be off instead"
+# Kind of a fault -> words: of samples that are no data, and of a size that the whole record is off by.
+NO_DATA = {"gap": "bridged over a gap", "clipped": "clipped", "stuck": "repeated", "spikes": "spikes"}
+OFF_BY = {
+    "start": "starts elsewhere than declared, by", "offset": "its sensor is off by", "gain": "its gain is off by",
+    "drift": "its sensor drifts by", "clock": "its clock is fast by a share of",
+}  # fmt: skip
 # Listed causes of the width of an interval, and listed models.
 MOST_CAUSES, MOST_LISTED = 2, 30
 # Of the keys of report.json: 2 came with probabilities.
@@ -119,14 +121,6 @@ class Judgement:
     holdout: Residuals | None
 
     @property
-    def train_error(self) -> JointErrors:
-        return self.train.errors
-
-    @property
-    def holdout_error(self) -> JointErrors | None:
-        return None if self.holdout is None else self.holdout.errors
-
-    @property
     def diagnosis(self) -> Diagnosis:
         return self.train.diagnosis
 
@@ -160,16 +154,15 @@ class Judgement:
 class Step:
     """Hold one turn of the loop: the effect that was added and what became of errors and parameters.
 
-    alternatives: names of the effects that may stand in its place, the most probable first. empirical: whether it is a
-    term without a name. claimed: whether its name is claimed. probability: that the machine has it. form: word of its
-    published form, "" for the first: `--effects NAME:FORM` declares it. instead: constants without a
-    tolerance that would explain the records as well -> by which share each would be off.
+    alternatives: names of the effects that may stand in its place, the most probable first. claimed: whether its name
+    is claimed. probability: that the machine has it. form: word of its published form, "" for the first:
+    `--effects NAME:FORM` declares it. instead: constants without a tolerance that would explain the records as well ->
+    by which share each would be off.
     """
 
     effect: str
     port: str
     alternatives: tuple[str, ...]
-    empirical: bool
     claimed: bool
     probability: float
     after: Judgement
@@ -276,7 +269,8 @@ def estimates(
         one = known[name]
         low, high = min(one.low, value), max(one.high, value)
         seen = [(cause, share) for cause, share in one.causes[:MOST_CAUSES] if round(share, 2)]
-        causes = tuple(f"{words_of(cause)}, {share:.0%}" for cause, share in seen)
+        causes = tuple(f"{cause if ' ' in cause or cause == 'noise' else f'whether {cause} acts'}, {share:.0%}"
+                       for cause, share in seen)  # fmt: skip
         doubts = [REMAINS] if discrepancy and (model != inference.in_force or is_unknown) else []
         if owner is not None and inference.posterior.probability("effect", owner.public) < CLAIMED:
             doubts.append(f"{owner.public} is not certain")
@@ -292,11 +286,6 @@ def estimates(
 def shown_ends(low: float, high: float) -> tuple[float | None, float | None]:
     """Return the ends of an interval, None for one that has none."""
     return (low, high) if np.isfinite(high - low) else (None, None)
-
-
-def words_of(cause: str) -> str:
-    """Return a cause of an interval's width in words."""
-    return cause if " " in cause or cause == "noise" else f"whether {cause} acts"
 
 
 def report_of(loop: ClosedLoop) -> dict[str, Any]:
@@ -354,17 +343,18 @@ def among(library: Library) -> list[int]:
 def step_entry(step: Step) -> dict[str, Any]:
     return {
         "effect": step.effect, "form": step.form, "port": step.port, "alternatives": step.alternatives,
-        "instead": step.instead,
-        "empirical": step.empirical, "claimed": step.claimed, "probability": step.probability,
+        # a step was a term without a name in results of earlier versions, whose readers ask for the key
+        "instead": step.instead, "empirical": False, "claimed": step.claimed, "probability": step.probability,
         "error": errors_of(step.after), "parameters": step.after.entries,
     }  # fmt: skip
 
 
 def errors_of(judged: Judgement) -> dict[str, Any]:
     """Return the errors on train, on holdout (None where there is none) and on each record."""
-    replays = (*judged.train.judged, *(judged.holdout.judged if judged.holdout is not None else ()))
-    return {"train": judged.train_error, "holdout": judged.holdout_error,
-            "records": errors_by_file(replays, judged.train.candidate)}  # fmt: skip
+    train, holdout = judged.train, judged.holdout
+    replays = (*train.judged, *(() if holdout is None else holdout.judged))
+    return {"train": train.errors, "holdout": None if holdout is None else holdout.errors,
+            "records": errors_by_file(replays, train.candidate)}  # fmt: skip
 
 
 def record_entries(before: Residuals | None, after: Residuals | None) -> list[dict[str, Any]]:
@@ -468,10 +458,9 @@ def along(value: float, low: float, high: float) -> tuple[float, float]:
 def fault_sentence(s: RecordFault) -> str:
     factor, name = shown(1.0, s.unit)
     unit = behind(name)
-    if s.kind in ("gap", "clipped", "stuck", "spikes"):
-        words = {"gap": "bridged over a gap", "clipped": "clipped", "stuck": "repeated", "spikes": "spikes"}[s.kind]
-        where = f"from {s.from_s:.4g} to {s.to_s:.4g} s"
-        return f"{s.record}: {s.value:.0f} samples are {words}, {where}: they count as no data."
+    if s.kind in NO_DATA:
+        return (f"{s.record}: {s.value:.0f} samples are {NO_DATA[s.kind]}, from {s.from_s:.4g} to {s.to_s:.4g} s: they "
+                "count as no data.")  # fmt: skip
     if s.kind == "label" or s.value is None or s.low is None or s.high is None:
         return f"{s.record} looks like a record of another load, or of other inputs than it tells."
     if s.parameter:
@@ -487,12 +476,9 @@ def fault_sentence(s: RecordFault) -> str:
         low, high = along(s.value, 1e3 * s.low, 1e3 * s.high)
         where = f"{s.record}, {s.output}: its sensor is" if s.output else f"{s.record}: starts"
         return f"{where} {sized(1e3 * abs(s.value), low, high, f' ms {word}')}; corrected."
-    words = {"start": "starts elsewhere than declared, by", "offset": "its sensor is off by",
-             "gain": "its gain is off by", "drift": "its sensor drifts by",
-             "clock": "its clock is fast by a share of"}[s.kind]  # fmt: skip
     where = f"{s.record}, {s.output}" if s.output else s.record
     size = sized(factor * s.value, factor * s.low, factor * s.high, unit)
-    return f"{where}: {words} {size}; corrected."
+    return f"{where}: {OFF_BY[s.kind]} {size}; corrected."
 
 
 def sized(value: float, low: float, high: float, unit: str) -> str:

@@ -125,15 +125,6 @@ def finite_or_inf(values: Array, failed: NDArray[np.bool_]) -> Array:
     return values if good.all() else np.where(good, values, np.inf)
 
 
-def record_weights(fitness: Fitness, durations: ArrayLike, n_samples: ArrayLike) -> Array:
-    """Return what each record weighs, (n_records,), from their durations [s] and numbers of samples."""
-    ones = np.ones(np.shape(n_samples))
-    weight = np.asarray({"duration": durations, "samples": n_samples, "sum": ones}[fitness.join], dtype=np.float64)
-    if not ((weight > 0.0) & (weight < np.inf)).all():
-        raise ArmidError(f"fitness '{fitness.name}' weighs records by {fitness.join}, expected numbers above 0")
-    return weight
-
-
 def joined(fitness: Fitness, table: Array, weight: Array) -> Array:
     """Join the values of records, (n_records, n_candidates): one for each candidate, +inf if a record failed."""
     failed = ~np.asarray(np.isfinite(table).all(axis=0))
@@ -228,9 +219,9 @@ def unity(noise: float) -> float:
 
 def dissimilarity(measured: ArrayLike, simulated: ArrayLike, interval: float, degree: int = 0) -> Array:
     """Return 1 - S of Eq 10 per candidate, +inf for one that is not finite; degree 2: 1 - S2 of Eq 14, in steps."""
-    from armid.problem.similarity import scored
+    from armid.problem.similarity import similarity
 
-    return np.asarray(1.0 - scored(measured, simulated, interval, failed=-np.inf)[degree])
+    return 1.0 - similarity(measured, simulated, interval, failed=-np.inf)[degree]
 
 
 shape_dissimilarity = partial(dissimilarity, degree=2)

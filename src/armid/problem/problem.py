@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,10 +12,12 @@ from numpy.typing import ArrayLike, NDArray
 from armid.engine import Calibration, Prepared, Schedule, Simulation, accuracy_against, calibrate, prepare, probes
 from armid.errors import ArmidError, nearest
 from armid.model import Array, Model
-from armid.problem.fitness import Fitness, joined, record_weights
+from armid.problem.fitness import Fitness, joined
 from armid.problem.meter import Meter, Metered
 from armid.problem.space import Space
 from armid.record import Piece, Record
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,9 +99,7 @@ class Replay:
         return self.changed(record=self.ready.record.with_measured({self.record.output: measured}))
 
     def seen(self, runs: Sequence[Simulation]) -> Array:
-        triples = zip(self.pieces, self.record.samples, (run.outputs[self.place] for run in runs), strict=True)
-        parts = [signal if isinstance(samples, slice) and not piece.window.start else signal[:, samples]
-                 for piece, samples, signal in triples]  # fmt: skip
+        parts = [run.outputs[self.place][:, samples] for run, samples in zip(runs, self.record.samples, strict=True)]
         return np.ascontiguousarray(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=1))
 
     def signal(self, candidates: Array) -> Array:
@@ -144,6 +144,12 @@ def by_record(replays: Sequence[Replay]) -> dict[ReadyRecord, list[Replay]]:
     for replay in replays:
         groups.setdefault(replay.ready, []).append(replay)
     return groups
+
+
+def by_output(replays: Sequence[Replay], values: Sequence[T]) -> dict[int, list[T]]:
+    """Return the place of each output that is recorded, in order, with the values of its replays."""
+    pairs = list(zip(replays, values, strict=True))
+    return {place: [v for r, v in pairs if r.place == place] for place in sorted({r.place for r in replays})}
 
 
 def ready_record(
@@ -300,20 +306,16 @@ class IdentificationProblem(Metered):
 
     def evaluated(self, X: Array, residuals: bool) -> tuple[Array, Array | None]:
         """Return fitness, +inf where one diverged, and where asked the weighted residuals, (n_candidates, n_total)."""
-        if not residuals:
-            # so many candidates have their signals in memory at a time; no result depends on it
-            size = LANES * max(MOST_AT_ONCE // (LANES * sum(x.size for x in self.measured)), 1)
-            parts = [self._fitness(X[first : first + size])[0] for first in range(0, max(len(X), 1), size)]
-            return parts[0] if len(parts) == 1 else np.concatenate(parts), None
-        values, signals = self._fitness(X)
-        return values, weighted(signals, self.measured, residual_weights(self.fitness, self.replays, self.sizes))
-
-    def _fitness(self, X: Array) -> tuple[Array, list[Array]]:
-        """Return the fitness of candidates, (n_candidates,), and their signals in each record."""
-        candidates = self.space.complete(X)
-        signals = signals_of(self.replays, candidates)
-        values = fitness_of(self.fitness, self.replays, self.measured, signals, self.record_weights, self.sizes)
-        return values, signals
+        # so many candidates have their signals in memory at a time; no result depends on it
+        size = LANES * max(MOST_AT_ONCE // (LANES * sum(x.size for x in self.measured)), 1)
+        weights = residual_weights(self.fitness, self.replays, self.sizes) if residuals else []
+        values, vectors = [], []
+        for first in range(0, max(len(X), 1), size):
+            signals = signals_of(self.replays, self.space.complete(X[first : first + size]))
+            known = self.measured, signals, self.record_weights, self.sizes
+            values.append(fitness_of(self.fitness, self.replays, *known))
+            vectors += [weighted(signals, self.measured, weights)] if residuals else []
+        return np.concatenate(values), np.concatenate(vectors) if residuals else None
 
 
 def fitness_of(
@@ -364,6 +366,8 @@ def residual_weights(fitness: Fitness, replays: Sequence[Replay], sizes: Array) 
     return [fitness.weight_of(noise / size) / size for noise, size in pairs]
 
 
-def weights_of(fitness: Fitness, replays: tuple[Replay, ...]) -> Array:
+def weights_of(fitness: Fitness, replays: Sequence[Replay]) -> Array:
+    """Return what each record weighs where their values join, (n_records,): its duration [s], its samples, or 1."""
     records = [r.record for r in replays]
-    return record_weights(fitness, [r.duration for r in records], [r.n_samples for r in records])
+    weights = {"duration": [r.duration for r in records], "samples": [r.n_samples for r in records]}
+    return np.array(weights.get(fitness.join, [1.0] * len(records)), dtype=np.float64)

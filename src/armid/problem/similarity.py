@@ -13,7 +13,7 @@ NEAR_END, LEAST_PEAK = 0.03, 3.0
 
 def similarity(
     measured: ArrayLike, simulated: ArrayLike, interval: float, epsilon: float = 0.03, xi: float = 0.030,
-    slope_threshold: float = 0.2, noise: float = 0.0,
+    slope_threshold: float = 0.2, noise: float = 0.0, failed: float = 0.0,
 ) -> tuple[Array, Array, Array]:  # fmt: skip
     """Compare a population with the measurement: S = sqrt(S1 S2), each in [0, 1].
 
@@ -36,11 +36,13 @@ def similarity(
     noise : float
         Rms [signal's unit]. A lone extremum within 3 % of the series' length from its end is not a landmark when its
         height is below three times that; 0, as in the paper: every one is.
+    failed : float
+        What a candidate that holds a NaN or an infinity gets.
 
     Returns
     -------
     tuple of arrays
-        S, S1, S2, each (n_candidates,); all three are 0 for a candidate that holds a NaN or an infinity.
+        S, S1, S2, each (n_candidates,).
 
     Raises
     ------
@@ -54,7 +56,18 @@ def similarity(
     >>> S1.round(6)
     array([1. , 0.9])
     """
-    scores = scored(measured, simulated, interval, epsilon, xi, slope_threshold, noise=noise)
+    x, rows = as_series(measured, simulated)
+    if not (0.0 < interval < np.inf and 0.0 < slope_threshold < np.inf):
+        raise ArmidError(f"interval is {interval} and slope_threshold {slope_threshold}, expected numbers above 0")
+    if not (0.0 <= epsilon < np.inf and 0.0 <= xi < np.inf and 0.0 <= noise < np.inf):
+        raise ArmidError(f"epsilon is {epsilon}, xi {xi} and noise {noise}, expected numbers of at least 0")
+    scores, whole, n_intervals = score(
+        x, rows, float(interval), float(epsilon), float(xi), float(slope_threshold), float(failed),
+        LEAST_PEAK * noise,
+    )  # fmt: skip
+    refuse_zero(whole)
+    if n_intervals == 0:
+        raise ArmidError(f"the measured series is constant ({x[0]:g}) and has no shape to compare")
     return scores[0], scores[1], scores[2]
 
 
@@ -75,25 +88,6 @@ def numerical_similarity(measured: ArrayLike, simulated: ArrayLike, failed: floa
     x, rows = as_series(measured, simulated)
     scores, whole = score_numerically(x, rows, float(failed))
     refuse_zero(whole)
-    return np.asarray(scores)
-
-
-def scored(
-    measured: ArrayLike, simulated: ArrayLike, interval: float, epsilon: float = 0.03, xi: float = 0.030,
-    slope_threshold: float = 0.2, failed: float = 0.0, noise: float = 0.0,
-) -> Array:  # fmt: skip
-    x, rows = as_series(measured, simulated)
-    if not (0.0 < interval < np.inf and 0.0 < slope_threshold < np.inf):
-        raise ArmidError(f"interval is {interval} and slope_threshold {slope_threshold}, expected numbers above 0")
-    if not (0.0 <= epsilon < np.inf and 0.0 <= xi < np.inf and 0.0 <= noise < np.inf):
-        raise ArmidError(f"epsilon is {epsilon}, xi {xi} and noise {noise}, expected numbers of at least 0")
-    scores, whole, n_intervals = score(
-        x, rows, float(interval), float(epsilon), float(xi), float(slope_threshold), float(failed),
-        LEAST_PEAK * noise,
-    )  # fmt: skip
-    refuse_zero(whole)
-    if n_intervals == 0:
-        raise ArmidError(f"the measured series is constant ({x[0]:g}) and has no shape to compare")
     return np.asarray(scores)
 
 

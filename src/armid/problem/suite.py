@@ -444,7 +444,6 @@ def line_across(point: Array, direction: Array) -> Array:
 
 def n_minima(values: Array) -> int:
     """Return the number of local minima of a sequence, its ends among them; a flat stretch counts once."""
-    known = values[np.isfinite(values)]
-    steps = np.sign(np.diff(known))
-    steps = np.concatenate([[-1.0], steps[steps != 0.0], [1.0]])
-    return int(((steps[:-1] < 0.0) & (steps[1:] > 0.0)).sum())
+    from scipy.signal import find_peaks
+
+    return len(find_peaks(-np.pad(values[np.isfinite(values)], 1, constant_values=np.inf))[0])
