@@ -112,7 +112,7 @@ def test_named_inputs_win_and_degrees_become_radians(write, axis_columns):
     ("", {"drive_V": None}, ["move.csv, line 1", "input 'u'", "drive_N_m"]),
     ("", {"drive_V": None, "drive_kN": 1.0}, ["move.csv, line 1", "'drive_kN'", "unknown unit", "drive_N"]),
     ("", {"drive_N": 1.0}, ["drive_V and drive_N", "move.csv, line 1"]),
-    ("", {"drive_V": None, "motor_V": 1.0}, ["drive_N_m", "or u = 'motor_V' (numbers in V, N or N m) under [inputs] of campaign.toml is expec"]),
+    ("", {"drive_V": None, "motor_V": 1.0}, ["drive_N_m", "or u = 'motor_V' (numbers in V, N or N m) under [inputs]"]),
     ("", {"drive_V": 0.0}, ["drive", "0 throughout"]),
     ("", {"velocity_m_s": None, "angular_velocity_rad_s": WAVE, "angle_rad": 0.0, "angle_deg": 0.0},
      ["angle_rad and angle_deg", "at most one position"]),

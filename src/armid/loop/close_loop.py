@@ -40,6 +40,7 @@ from armid.loop.result import (
     ClosedLoop,
     Judgement,
     Step,
+    Verdict,
     Withdrawn,
     broken_records,
     estimates,
@@ -145,7 +146,7 @@ def close_loop(
     after = judged[kept]
     accused = [h for h in path[kept] if inference.posterior.probability(*h.public) >= MENTIONED]
     suspects = [*record_faults_of(accused, path[kept], inference), *broken_records(campaign.records)]
-    verdicts = (
+    verdicts: tuple[Verdict, ...] = (
         ("implausible_records", "unexplained") if implausible
         else verdicts_of(inference, accused, after, steps[:kept], withdrawn)
     )  # fmt: skip
@@ -284,11 +285,11 @@ def is_denied(before: Judgement, after: Judgement) -> bool:
 def verdicts_of(
     inference: Inference, accused: Sequence[Hypothesis], after: Judgement, steps: Sequence[Step],
     withdrawn: Withdrawn | None,
-) -> tuple[str, ...]:  # fmt: skip
+) -> tuple[Verdict, ...]:  # fmt: skip
     """Return the verdicts that hold, each in one word, the most important first."""
     post = inference.posterior
     unknown = post.unknown_is_likely
-    verdicts = ["does_not_carry_over"] if withdrawn is not None or after.fails_to_carry_over else []
+    verdicts: list[Verdict] = ["does_not_carry_over"] if withdrawn is not None or after.fails_to_carry_over else []
     verdicts += ["record_disagrees"] if any(h.kind in ("record", "drift") for h in accused) else []
     in_doubt = any(s.probability < CLAIMED or s.instead for s in steps) if steps else post.nothing < MENTIONED
     if in_doubt and not unknown and withdrawn is None and "record_disagrees" not in verdicts:

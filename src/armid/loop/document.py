@@ -1,6 +1,6 @@
 """The document of a closed loop, and details.json: what is stored next to report.json."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
@@ -25,6 +25,7 @@ from armid.loop.result import (
     REPORT_VERSION,
     ClosedLoop,
     Judgement,
+    Verdict,
     fault_sentence,
     record_entries,
     report_of,
@@ -95,7 +96,7 @@ FIGURES = {
     "missing": ("The missing signal without a form", "What would have to be added at each port, and against what it "
                 "depends."),
 }  # fmt: skip
-VERDICTS = {
+VERDICTS: dict[Verdict, str] = {
     "no_discrepancy": "Only noise is left", "explained": "Explained", "partly_explained": "Partly explained",
     "unexplained": "Unexplained", "cannot_tell_apart": "Effects cannot be told apart",
     "does_not_carry_over": "Does not carry over", "record_disagrees": "A record disagrees",
@@ -378,7 +379,7 @@ def headline(loop: ClosedLoop) -> str:
 
 def conclusion(loop: ClosedLoop) -> str:
     """Return the verdict as one sentence."""
-    sentence = {
+    sentence: dict[Verdict, Callable[[ClosedLoop], str]] = {
         "implausible_records": implausible, "record_disagrees": disagreeing_sentence,
         "does_not_carry_over": carried_sentence, "cannot_tell_apart": doubtful, "no_discrepancy": nothing_missing,
         "explained": explained, "partly_explained": partly, "unexplained": unexplained,

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 
@@ -42,6 +42,10 @@ OFF_BY = {
     "start": "starts elsewhere than declared, by", "offset": "its sensor is off by", "gain": "its gain is off by",
     "drift": "its sensor drifts by", "clock": "its clock is fast by a share of",
 }  # fmt: skip
+Verdict = Literal[
+    "implausible_records", "record_disagrees", "does_not_carry_over", "no_discrepancy", "explained", "partly_explained",
+    "unexplained", "cannot_tell_apart",
+]  # fmt: skip
 # Listed causes of the width of an interval, and listed models.
 MOST_CAUSES, MOST_LISTED = 2, 30
 # Of the keys of report.json: 2 came with probabilities.
@@ -186,10 +190,9 @@ class Withdrawn:
 class ClosedLoop(Result):
     """Hold the result of the closed loop; it prints itself, and has a table, figures and files.
 
-    verdict: "implausible_records", "record_disagrees", "does_not_carry_over", "no_discrepancy", "explained",
-    "partly_explained", "unexplained" or "cannot_tell_apart"; also: the others that hold. before, after: the declared
-    model, and the model in force, with the effects that earned their place. withdrawn: what the held-out records
-    denied, None where nothing. next_steps: what to do as well as the advised record, in words. known_together:
+    verdict, also: the most important one, and the others that hold. before, after: the declared model, and the model in
+    force, with the effects that earned their place. withdrawn: what the held-out records denied, None where nothing.
+    next_steps: what to do as well as the advised record, in words. known_together:
     which parameters and constants the train records give only together, in words. suspects: records that differ, and
     samples that are no data; error_all_records: "before" and "after" -> errors on train and holdout with nothing left
     out. inference: all models that were fitted, and how probable each is. missing: the signal that the model in force
@@ -198,8 +201,8 @@ class ClosedLoop(Result):
 
     kind: ClassVar[Kind] = LOOP
     campaign: Campaign
-    verdict: str
-    also: tuple[str, ...]
+    verdict: Verdict
+    also: tuple[Verdict, ...]
     before: Judgement
     after: Judgement
     steps: tuple[Step, ...]
