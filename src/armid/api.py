@@ -337,7 +337,7 @@ def close_loop(
     candidates : names, Effects, or a mapping of name to Effect
         Effects to look for; None: all that apply.
     rng : Generator
-        Not drawn from: nothing is random.
+        Not drawn from: searches start from evenly spread points, so that nothing is random.
     bounds, fixed : mappings of parameter to (low, high) and to value, SI
         Of the model or of a candidate.
     threads : int
@@ -393,7 +393,7 @@ def close_loop(
     share = {} if within is None else {"within": within}
     file = progress if isinstance(progress, Path) else None
     with status_line(progress is True) as shown, angles_in(known_too.angle):
-        loop: ClosedLoop = run(composed, known_too, kept, rng, bounds, values, threads, told or shown, curve,
+        loop: ClosedLoop = run(composed, known_too, kept, bounds, values, threads, told or shown, curve,
                                file, chances, **share)  # fmt: skip
     return loop
 

@@ -236,8 +236,6 @@ def close_loop_command(
     candidates. Searches start from evenly spread points, so nothing is random. Every verdict exits with 0. After an
     interruption the same command continues from the fits in DIR/progress.jsonl.
     """
-    from numpy.random import default_rng
-
     from armid.api import close_loop
 
     named = [name for name in candidates.split(",") if name.strip()] or None
@@ -245,7 +243,7 @@ def close_loop_command(
     kept = out / PROGRESS
     try:
         with status_line(speaks()) as show_status:
-            loop = close_loop(campaign, None, named, default_rng(seed), threads=threads, told=show_status,
+            loop = close_loop(campaign, None, named, threads=threads, told=show_status,
                               without=without, curve=not no_curve, progress=kept, within=within,
                               **given(**problem))  # fmt: skip
         show_and_save(loop, out)

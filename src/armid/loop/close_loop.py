@@ -64,7 +64,6 @@ def close_loop(
     model: Model,
     campaign: Campaign,
     candidates: Mapping[str, Effect] | None = None,
-    rng: np.random.Generator | None = None,
     bounds: Mapping[str, tuple[float, float]] | None = None,
     fixed: Mapping[str, float] | None = None,
     threads: int = 1,
@@ -88,8 +87,6 @@ def close_loop(
         Records of one machine.
     candidates : mapping of name to Effect
         Those whose ports the plant does not offer are left out; None: the library, and those of the plant's sensors.
-    rng : Generator, optional
-        Not drawn from: searches start from evenly spread candidates, so that nothing is random.
     bounds, fixed : mapping of parameter to (low, high) or value, SI
         Of the model or of a candidate.
     threads : int

@@ -29,7 +29,7 @@ LARGEST_INSTANCE = 65_535
 
 def export_ioh(results: StudyResults, path_of: Callable[[str], Path]) -> int:
     """Write one .json and one .dat for each algorithm and function; return how many runs they hold."""
-    runs = outcomes(results.runs, results.parameters)
+    runs = outcomes(results.runs, results.parameters, results.unit)
     runs["function"] = runs["case"] + ", " + runs["setting"] + ", " + runs["fitness"]
     ids = {name: i for i, name in enumerate(dict.fromkeys(runs["function"]), 1)}
     variants = list(dict.fromkeys(runs["variant"]))

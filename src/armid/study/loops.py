@@ -9,8 +9,6 @@ from json import dumps
 from pathlib import Path
 from typing import Any, ClassVar
 
-from numpy.random import default_rng
-
 from armid.errors import ArmidError, nearest, quoted
 from armid.loop import close_loop, report_of
 from armid.record.reader import CAMPAIGN_FILE, CSV_SUFFIX
@@ -116,8 +114,7 @@ class LoopStudy:
         wanted = [*settings["candidates"], *(n for n in known if n in sensors - {*settings.get("without", ())})]
         candidates = {n: lookup(known, n, "effect", "settings") for n in wanted}
         bounds = {name: (low, high) for name, (low, high) in settings["bounds"].items()}
-        rng, fixed = default_rng(settings["seed"]), settings["fixed"]
-        closed = close_loop(model, campaign, candidates, rng, bounds, fixed, threads=1)
+        closed = close_loop(model, campaign, candidates, bounds, settings["fixed"], threads=1)
         report = dumps(report_of(closed), allow_nan=False)
         return {"model": str(model), "rows": {"loops": [(closed.verdict, time.process_time() - began, report)]}}
 

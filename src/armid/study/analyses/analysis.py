@@ -12,7 +12,7 @@ from pandas import DataFrame, Series
 from armid.model import Array
 from armid.problem.fitness import FITNESS
 from armid.report.document import Column, Part, Table
-from armid.study.results import StudyResults
+from armid.study.results import SPEED_UNIT, StudyResults
 from armid.study.spec import NOISES
 from armid.study.store import ON, RunTrace
 from armid.units import scale_of
@@ -114,7 +114,7 @@ def trace_errors(trace: RunTrace, truth: Mapping[str, float]) -> Array:
     return np.asarray(np.max(np.abs(trace.X[:, known] - true[known]) / np.abs(true[known]), axis=1))
 
 
-WITHOUT_NOISE, SPEED_UNIT = "noise-free", "rad/s"
+WITHOUT_NOISE = "noise-free"
 PAPER = "the paper's pso"
 # Variants that a table of every row and parameter is printed for, with the paper's own method.
 MOST_OTHERS = 3
@@ -150,8 +150,7 @@ class Evidence:
         self._made: dict[Any, Any] = {}
         self.study: dict[str, Any] = results.study
         self.parameters: DataFrame = results.parameters
-        # of the records, SI; older studies do not tell it
-        self.unit = str(self.study.get("unit", SPEED_UNIT))
+        self.unit = results.unit
         self.runs = ordered(outcomes(results.runs, self.parameters, self.unit), self.study)
         budgets = Series("", index=self.runs.index)
         if self.study.get("budget_per_parameter"):
@@ -326,7 +325,7 @@ def wide_runs(evidence: Evidence) -> DataFrame:
     return wide.join(DataFrame(values, index=wide.index))
 
 
-def outcomes(runs: DataFrame, parameters: DataFrame, unit: str = SPEED_UNIT) -> DataFrame:
+def outcomes(runs: DataFrame, parameters: DataFrame, unit: str) -> DataFrame:
     """Return the runs with `variant`, `setting` (noise, and the window of several) and `largest_error`.
 
     variant: label of the identifier, and the fitness where a label ran on several. largest_error: relative, over the
@@ -351,7 +350,7 @@ def budget_texts(runs: DataFrame, study: dict[str, Any]) -> list[str]:
             for c, b in zip(runs["case"], runs["budget"], strict=True)]  # fmt: skip
 
 
-def noise_text(level: float, unit: str = SPEED_UNIT) -> str:
+def noise_text(level: float, unit: str) -> str:
     """Return a level of noise in words; unit: of the records, SI."""
     if np.isnan(level):
         return "as recorded"
