@@ -199,15 +199,12 @@ def around(times: Array, grid: Array) -> tuple[NDArray[np.intp], NDArray[np.intp
 
 def parabola_slopes(values: Array, times: Array, rows: NDArray[np.int64]) -> Array:
     """Return the slope at each row of the least-squares parabola through 7 neighbours, at the ends on one side."""
-    first, n = np.clip(rows - NEIGHBOURS // 2, 0, times.size - NEIGHBOURS), NEIGHBOURS
-    unit = float(np.median(np.diff(times)))
-    middle = sum((times[first + i] for i in range(n)), np.zeros(rows.size)) / n
-    places = [(times[first + i] - middle) / unit for i in range(n)]
-    second, third, fourth = (sum((t**k for t in places), np.zeros(rows.size)) for k in (2, 3, 4))
-    straight, curved = np.zeros(rows.size), np.zeros(rows.size)
-    for i, t in enumerate(places):
-        straight += t * values[first + i]
-        curved += (t**2 - second / n) * values[first + i]
+    n, unit = NEIGHBOURS, float(np.median(np.diff(times)))
+    near = np.clip(rows - n // 2, 0, times.size - n) + np.arange(n)[:, np.newaxis]
+    middle = np.sum(times[near], axis=0) / n
+    t, x = (times[near] - middle) / unit, values[near]
+    second, third, fourth = (np.sum(t**k, axis=0) for k in (2, 3, 4))
+    straight, curved = np.sum(t * x, axis=0), np.sum((t**2 - second / n) * x, axis=0)
     bend = fourth - second**2 / n
     share = second * bend - third**2
     own = (times[rows] - middle) / unit

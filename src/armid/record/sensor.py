@@ -407,11 +407,9 @@ def divided_differences(values: Array, times: Array, order: int) -> Array:
     """
     n, unit = values.size - order, float(np.median(np.diff(times)))
     total, squares = np.zeros(n), np.zeros(n)
+    windows = np.lib.stride_tricks.sliding_window_view(times, order + 1).T
     for j in range(order + 1):
-        weight = np.ones(n)
-        for i in range(order + 1):
-            if i != j:
-                weight *= unit / (times[j : j + n] - times[i : i + n])
+        weight = np.prod(unit / np.delete(windows[j] - windows, j, axis=0), axis=0)
         total += weight * values[j : j + n]
         squares += weight**2
     return total / np.sqrt(squares)
