@@ -167,10 +167,8 @@ class New:
         self.n_rest = int(np.searchsorted(self.at, timing.first))
         self.rest, self.motion = self.values[: self.n_rest], self.values[self.n_rest :]
         apart = np.diff(self.at[self.n_rest :])
-        even = timing.irregularity is None and apart.size > 0 and apart.min() == apart.max()
+        even = not timing.irregularity and apart.size > 0 and apart.min() == apart.max()
         self.uneven = None if even else self.times[self.n_rest :]
-        before = self.times[: self.n_rest]
-        self.interval = float(np.median(np.diff(before))) if before.size > 1 else timing.interval
 
     def since(self, counted: Array) -> Mask:
         """Return whether a count over all rows has grown since the row of data before, (n,)."""
@@ -179,7 +177,7 @@ class New:
 
 def rest_and_noise(new: New, inputs: Sequence[Array], is_speed: bool) -> tuple[Array, Noise]:
     """Return the samples at rest, before the motion or between motions, and the noise that they or the motion tell."""
-    noise = noise_of(new.rest, new.motion, new.interval, new.uneven)
+    noise = noise_of(new.rest, new.motion, new.uneven)
     if new.rest.size >= FEWEST_REST_SAMPLES or not inputs:
         return new.rest, noise
     changes = sum((np.append(0, np.cumsum(np.diff(x) != 0.0)) for x in inputs), np.zeros(inputs[0].size))
@@ -189,7 +187,7 @@ def rest_and_noise(new: New, inputs: Sequence[Array], is_speed: bool) -> tuple[A
     # equal values tell the step of the sensor alone, which the motion tells as well
     if not rest.size or np.ptp(rest) == 0.0:
         return new.rest, noise
-    noise = noise_of(rest, new.motion, new.interval, new.uneven)
+    noise = noise_of(rest, new.motion, new.uneven)
     return (rest - np.mean(rest), noise) if noise.source == "rest" else (new.rest, noise)
 
 
