@@ -111,10 +111,6 @@ def shows_bias(machine: Machine) -> bool:
     return machine.name not in ("elastic_joint", "hydraulic_boom")
 
 
-def records_angle(machine: Machine) -> bool:
-    return machine.outputs[0].state == 0
-
-
 def keep(s: Sizes, z: Any, here: Here) -> Any:
     """Return nothing: a late command is made by the integration."""
     return 0.0, []
@@ -209,17 +205,15 @@ def root_law(s: Sizes, z: Any, here: Here) -> Any:
     return -s["level"] * np.abs(here.v / here.machine.speed) ** 0.5 * here.sign, []
 
 
-def dahl(s: Sizes, z: Any, here: Here) -> Any:
-    width = WIDTH * here.machine.speed
-    size = here.v**2 / np.sqrt(here.v**2 + width**2)
-    return -s["level"] * z[0], [(here.v - size * z[0]) / s["way"]]
-
-
 def lugre(s: Sizes, z: Any, here: Here) -> Any:
     width = WIDTH * here.machine.speed
     g = 1.0 + s["excess"] * np.exp(-((here.v / s["fade"]) ** 2))
     size = here.v**2 / np.sqrt(here.v**2 + width**2)
     return -s["level"] * z[0], [(here.v - size * z[0] / g) / s["way"]]
+
+
+def dahl(s: Sizes, z: Any, here: Here) -> Any:
+    return lugre({**s, "excess": 0.0, "fade": 1.0}, z, here)
 
 
 def maxwell_slip(s: Sizes, z: Any, here: Here) -> Any:
@@ -351,22 +345,6 @@ def from_command(s: Sizes, here: Here) -> list[Array]:
     return [here.u, np.zeros_like(here.u)]
 
 
-def from_effort(s: Sizes, here: Here) -> list[Array]:
-    return [here.effort]
-
-
-def gap_after(s: Sizes, z: Any, here: Here) -> list[Array]:
-    return [drive_play(s, z, here)[0]]
-
-
-def behind_winding(machine: Machine) -> bool:
-    return machine.volts
-
-
-def without_winding(machine: Machine) -> bool:
-    return not machine.volts
-
-
 BOOK = "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, doi:10.1016/0005-1098(94)90209-7"
 CONTROL = "Astrom and Murray, Feedback Systems, chapter 9"
 TAO = "Tao and Kokotovic 1994, IEEE Trans. Automatic Control 39(1)"
@@ -383,9 +361,9 @@ FORMS = (
     Form("dead_time", "beating", "command", {**LATE, "period": (0.3, 2.0, "s")}, keep,
          "Nilsson, Bernhardsson, Wittenmark 1998, doi:10.1016/S0005-1098(97)00170-2"),
     Form("lag", "voltage", "signal", {"time": (0.005, 0.05, "s")}, lag, "Leonhard, Control of Electrical Drives",
-         named("drive_lag"), 1, from_command, fits=behind_winding),
+         named("drive_lag"), 1, from_command, fits=lambda machine: machine.volts),
     Form("lag", "actuator", "drive", {"time": (0.02, 0.3, "s")}, effort_lag, "doi:10.1109/MRA.2012.2206474",
-         named("drive_lag"), 1, from_effort, fits=without_winding),
+         named("drive_lag"), 1, lambda s, here: [here.effort], fits=lambda machine: not machine.volts),
     Form("lag", "second_order", "signal", {"time": (0.008, 0.06, "s"), "damping": (0.3, 0.8, "1")}, second_lag,
          "Merritt, Hydraulic Control Systems, chapter 7", n_states=2, start=from_command),
     Form("lag", "rate_limit", "signal", {"slowness": (0.05, 0.5, "s/command")}, rate_limit,
@@ -427,9 +405,10 @@ FORMS = (
     Form("backlash", "coupling", "play", {"gap": (0.01, 0.05, "1")}, keep, TAO, named("backlash"),
          fits=lambda machine: machine.name == "elastic_joint"),
     Form("backlash", "drive_play", "signal", {"gap": (0.02, 0.15, "command")}, drive_play,
-         "Tao and Kokotovic 1995, doi:10.1109/9.341778", n_states=1, start=lambda s, here: [here.u], after=gap_after),
+         "Tao and Kokotovic 1995, doi:10.1109/9.341778", n_states=1, start=lambda s, here: [here.u],
+         after=lambda s, z, here: [drive_play(s, z, here)[0]]),
     Form("backlash", "sensor_play", "sensor", {"gap": (0.005, 0.05, "angle")}, sensor_play,
-         "Nordin and Gutman 2002, doi:10.1016/S0005-1098(02)00047-X", fits=records_angle),
+         "Nordin and Gutman 2002, doi:10.1016/S0005-1098(02)00047-X", fits=lambda m: m.outputs[0].state == 0),
     Form("cogging", "sine", "torque", {"level": (0.02, 0.15, "effort"), **WAVES}, ripple,
          "Holtz and Springob 1996, IEEE Trans. Industrial Electronics 43(2)", named("torque_ripple", "cogging")),
     Form("cogging", "two_harmonics", "torque", {"level": (0.02, 0.1, "effort"), **WAVES, "second": (0.4, 1.0, "1")},

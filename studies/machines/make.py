@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from machines.campaign import files_of, key_text
+from machines.campaign import files_of
 from machines.catalogue import MACHINES
 from machines.draw import drawn, plan
 from stand import RefusalError
@@ -61,7 +61,7 @@ def make(options: argparse.Namespace) -> str:
             name = f"c{index:03d}"
             if name not in entries:
                 entries[name] = write_campaign(folder / name, options.seed, index, names)
-                replaced(part, key_text(head, entries))
+                replaced(part, json.dumps({**head, "campaigns": entries}, indent=1) + "\n")
         part.rename(key)
     except OSError as error:
         raise RefusalError(f"{error.filename} cannot be written: {error.strerror}") from error
