@@ -59,8 +59,8 @@ def timing_of(times: Array, from_rest: bool, file: str) -> Timing:
         # a thousandth of an interval before t = 0 counts as 0
         slack = EVEN_TIMES * float(np.median(np.diff(times))) if times.size > 1 else 0.0
         first = int(np.searchsorted(times, -slack))
-    motion = times[first:]
-    check_number(motion.size, from_rest, file)
+    motion, place = times[first:], "after t = 0" if from_rest else "in the record"
+    check_number(motion.size, f"{file}:", place)
     interval, tolerance, even = fitted_grid(motion, file)
     begin, start = float(motion[0]), 0.0 if from_rest else float(motion[0])
     if begin - start > LATEST_START * interval:
@@ -68,7 +68,7 @@ def timing_of(times: Array, from_rest: bool, file: str) -> Timing:
                          "at or before 0 is expected")  # fmt: skip
     resampled = not even or abs(begin - start) > tolerance
     n_samples = grid_size(motion, start, interval, file) if resampled else motion.size
-    check_number(n_samples, from_rest, file)
+    check_number(n_samples, f"{file}:", place)
     # a plant from rest may have lost its sample at t = 0; an axis may begin before 0, and what is before 0 never counts
     earliest = 0 if from_rest and first > 0 else int(np.ceil((max(begin, 0.0) - start) / interval - EVEN_TIMES))
     irregularity = "" if even else irregularity_of(motion)
@@ -78,10 +78,10 @@ def timing_of(times: Array, from_rest: bool, file: str) -> Timing:
     return Timing(start, interval, n_samples, first, max(earliest, 0), resampled, irregularity)
 
 
-def check_number(n_samples: int, from_rest: bool, file: str) -> None:
+def check_number(n_samples: int, where: str, which: str) -> None:
+    """Refuse fewer than 20 samples; where, which: the words around their number."""
     if n_samples < FEWEST_SAMPLES:
-        place = "after t = 0" if from_rest else "in the record"
-        raise ArmidError(f"{file}: {n_samples} samples {place}, at least {FEWEST_SAMPLES} are expected")
+        raise ArmidError(f"{where} {n_samples} samples {which}, at least {FEWEST_SAMPLES} are expected")
 
 
 def fitted_grid(times: Array, file: str) -> tuple[float, float, bool]:
@@ -260,9 +260,7 @@ def window_samples(record: Record, window_s: Sequence[float] | None, where: str)
         ends = np.clip((np.array([begin, end]) - grid.start_time) / grid.interval, -1.0, n_samples)
         low = max(int(np.ceil(ends[0] - SLACK)), low)
         high = min(int(np.floor(ends[1] + SLACK)) + 1, high)
-    if high - low < FEWEST_SAMPLES:
-        raise ArmidError(f"{where}: the window holds {max(high - low, 0)} samples of {record.file}, at least "
-                         f"{FEWEST_SAMPLES} are expected")  # fmt: skip
+    check_number(max(high - low, 0), f"{where}: the window holds", f"of {record.file}")
     return low, high
 
 
