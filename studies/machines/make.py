@@ -19,6 +19,7 @@ from machines.catalogue import MACHINES
 from machines.draw import drawn, plan
 from stand import RefusalError
 from stand.blind.many import LARGEST
+from stand.campaign import write_files
 from stand.command import Parser, carry_out
 
 
@@ -75,9 +76,7 @@ def write_campaign(folder: Path, seed: int, index: int, names: Sequence[str]) ->
     """Write one campaign and return its entry in the key."""
     planned, rng = plan(seed, index, names)
     files, entry = files_of(folder.name, drawn(planned, rng), rng)
-    folder.mkdir(exist_ok=True)
-    for file, content in files.items():
-        (folder / file).write_bytes(content.encode())
+    write_files(folder, files)
     return {"index": index, **entry}
 
 
