@@ -21,11 +21,6 @@ def current(voltage, winding, motor_constant, v, resistance):
     return (voltage + winding - motor_constant * v) / resistance
 
 
-def motor_effort(motor_constant, current):
-    """Effort of the motor [N m, N]."""
-    return motor_constant * current
-
-
 def motor_voltage(duty, supply):
     """Mean voltage of the bridge [V]."""
     return duty * supply
@@ -66,16 +61,6 @@ def boom_drop(load_drop, q):
     return -load_drop * np.cos(q)
 
 
-def motor_torque(torque_constant, current_in):
-    """Torque of the motor [N m]."""
-    return torque_constant * current_in
-
-
-def play_half(play):
-    """Half the play of the joint [rad]; effects alone bring one."""
-    return play
-
-
 def joint_torque(twist, twist_speed, stiffness, joint_damping, series_compliance, play_half, coupling):
     """Torque of the joint on the motor [N m]."""
     stretch = twist - np.maximum(np.minimum(twist, play_half), -play_half)
@@ -87,21 +72,6 @@ def joint_torque(twist, twist_speed, stiffness, joint_damping, series_compliance
 def motor_acceleration(drive_effort, drive, joint_torque, torque, damping, v, motor_inertia):
     """Acceleration of the motor [rad/s2]."""
     return (drive_effort + drive + joint_torque + torque - damping * v) / motor_inertia
-
-
-def recorded_position(q, position_sensor):
-    """Position as recorded [m]."""
-    return q + position_sensor
-
-
-def recorded_motor_angle(q, motor_angle_sensor):
-    """Angle of the motor as recorded [rad]."""
-    return q + motor_angle_sensor
-
-
-def recorded_twist(twist, twist_sensor):
-    """Twist of the joint as recorded [rad]."""
-    return twist + twist_sensor
 
 
 def level_rate(drive_effort, drive, torque, inertia):
@@ -153,7 +123,7 @@ def starts(unit="rad"):
 
 SPEED = Constant("start_speed", 0.0, "rad/s", "set from the record")
 ALIASES = {"omega": "v", "theta": "q", "speed": "v", "position": "q"}
-MOTOR = {"current": current, "drive_effort": motor_effort}
+MOTOR = {"current": current, "drive_effort": lambda motor_constant, current: motor_constant * current}
 INERTIA = Parameter("inertia", "kg m2", 5e-5, 0.02, nominal=1e-3, note="of everything that turns")
 MOTOR_CONSTANT = Parameter("motor_constant", "N m/A", 0.01, 0.5, nominal=0.1, note="also in V s/rad")
 RESISTANCE = Constant("resistance", 1.5, "ohm", "of winding and leads")
@@ -234,7 +204,8 @@ cart = Plant(
         Parameter("motor_constant", "N/A", 0.5, 50.0, nominal=6.0, note="at the rail; also in V s/m"),
     ),
     states=turning(cart_rate, unit="m"),
-    quantities={**MOTOR, "voltage": cart_voltage, "recorded_position": recorded_position},
+    quantities={**MOTOR, "voltage": cart_voltage,
+                "recorded_position": lambda q, position_sensor: q + position_sensor},
     constants=(RESISTANCE, Constant("kp", 50.0, "V/m", "gain of the controller", tolerance=0.0), *starts("m")),
     inputs=(Input("target", "m", ("target_m",), typical=(-0.15, 0.15)),),
     ports={"torque": "N", "drive": "N", "winding": "V", "position_sensor": "m"}, aliases=ALIASES,
@@ -269,9 +240,12 @@ elastic_joint = Plant(
             State("twist", "rad", lambda twist_speed: twist_speed, lambda start_twist: start_twist, "twist_state_rad"),
             State("twist_speed", "rad/s", twist_speed_rate, lambda start_twist_speed: start_twist_speed,
                   "twist_speed_state_rad_s")),
-    quantities={"drive_effort": motor_torque, "motor_acceleration": motor_acceleration, "play_half": play_half,
-                "joint_torque": joint_torque, "recorded_motor_angle": recorded_motor_angle,
-                "recorded_twist": recorded_twist},
+    quantities={
+        "drive_effort": lambda torque_constant, current_in: torque_constant * current_in,
+        "motor_acceleration": motor_acceleration, "play_half": lambda play: play, "joint_torque": joint_torque,
+        "recorded_motor_angle": lambda q, motor_angle_sensor: q + motor_angle_sensor,
+        "recorded_twist": lambda twist, twist_sensor: twist + twist_sensor,
+    },
     constants=(
         Constant("torque_constant", 0.5, "N m/A", "of the motor, at the joint"), *starts(),
         Constant("start_twist", 0.0, "rad", "set from the record"),
