@@ -23,9 +23,6 @@ from armid.engine.transpile import SourceText, local_name
 from armid.model import Model
 from armid.model.graph import LATE_LEAVES, Node
 
-# Candidates side by side: one register of AVX-512, two of AVX2. Measured on the arm: 16 lanes are slower, because their
-# values no longer fit.
-LANE_WIDTH = 8
 # Samples that are gathered before they are copied to the rows of the candidates; times that one step may be cut; sample
 # intervals that one step may span.
 BLOCK = 256
@@ -107,7 +104,7 @@ def kernel_text(parts: KernelParts) -> str:
     given = "delayed, history, steps_kept, place, per_part, part, edges, numbers, " + "".join(of_delays)
     return environment.get_template(TEMPLATE.name).render(
         parts | {"latch_names": latches} | lists, guards=guards, carried=carried, driven=driven, late_names=late_states,
-        width=LANE_WIDTH, block=BLOCK, max_cuts=MAX_CUTS, longest=LONGEST_SPAN,
+        block=BLOCK, max_cuts=MAX_CUTS, longest=LONGEST_SPAN,
         switches=list(zip(latches, parts["latch_guards"], strict=True)), remembered=remembered,
         last_rates=listed(remembered, "k4_"), late_by=of_delays[0], late_by_names=[f"late_by_{i}" for i in numbers],
         late_given=given if late_of else "", n_cutting=parts["n_moving"] if inputs else 0,

@@ -15,6 +15,7 @@ import numpy as np
 from numba.extending import overload
 
 from armid.engine.simd import (
+    LANE_WIDTH,
     LINKED,
     RARE,
     Lanes,
@@ -27,7 +28,6 @@ from armid.engine.simd import (
     lane,
     mantissa_of,
     mixes_lanes,
-    n_lanes,
     nearest,
     negate,
     select,
@@ -100,7 +100,7 @@ def far_by_lane(function: Callable[[float], float]) -> Any:
 
     @rare
     def put(x, result):
-        for i in range(n_lanes(x)):
+        for i in range(LANE_WIDTH):
             if abs(lane(x, i)) > FAR_ANGLE:
                 result = with_lane(result, i, function(lane(x, i)))
         return result
@@ -174,7 +174,7 @@ def lanes_power(base, exponent):
 
 @rare
 def power_by_lane(a, b, result):
-    for i in range(n_lanes(result)):
+    for i in range(LANE_WIDTH):
         if not (lane(a, i) > SMALLEST_FLOAT and lane(result, i) == lane(result, i)):
             result = with_lane(result, i, math.pow(lane(a, i), lane(b, i)))
     return result

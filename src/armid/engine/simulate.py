@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armid.engine.compile import UNCOMPILABLE, Kernel, compile_error, compile_model, compiling
-from armid.engine.generate import LANE_WIDTH
+from armid.engine.simd import LANE_WIDTH
 from armid.errors import ArmidError, nearest
 from armid.model import Array, Manoeuvre, Model
 from armid.model.graph import LATE_LEAVES, Node
