@@ -14,7 +14,7 @@ ONE_LANE = {
     "select": lambda a, b, x, y: x if a > b else y, "any_above": lambda a, b: a > b, "fabs": abs,
     "floor_of": np.floor, "nearest": np.rint, "fused": lambda a, b, c: a * b + c, "square_root": math.sqrt,
     "two_to_the": lambda k: 2.0**k, "mantissa_of": lambda x: 2.0 * np.frexp(x)[0],
-    "exponent_of": lambda x: math.frexp(x)[1] - 1.0, "n_lanes": lambda x: 1, "lane": lambda x, i: x,
+    "exponent_of": lambda x: math.frexp(x)[1] - 1.0, "LANE_WIDTH": 1, "lane": lambda x, i: x,
     "with_lane": lambda x, i, value: value,
 }  # fmt: skip
 NUMBERS = (-700.0, -40.5, -3.0, -1.0, -0.7, -1e-3, 1e-9, 0.01, 0.3, 0.7, 1.0, 2.0, 2.5, 19.0, 650.0)

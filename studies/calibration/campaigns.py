@@ -16,6 +16,7 @@ from machines.draw import drawn, plan
 from machines.make import replaced
 from stand.blind.campaign import SUITE
 from stand.blind.suite import read_suite
+from stand.campaign import write_files
 from stand.families import make
 
 ARM = ("control", "one", "two", "three", "fault", "drawn", "wrong", "unlisted")
@@ -74,10 +75,8 @@ def campaign_of(task: Task, folder: Path, seed: int, without_left_out: bool) -> 
     there, key = folder / "campaigns" / task.campaign, truth_file(folder, task)
     if not key.exists():
         files, entry = made_machine(task, seed, without_left_out) if task.family == MACHINE else made_arm(task, seed)
-        there.mkdir(parents=True, exist_ok=True)
+        write_files(there, files)
         key.parent.mkdir(exist_ok=True)
-        for name, text in files.items():
-            (there / name).write_bytes(text.encode())
         written(key, entry)
     return there, json.loads(key.read_text())
 

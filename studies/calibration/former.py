@@ -15,23 +15,9 @@ from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-# Names that both versions have.
-from armid.loop.close_loop import close_loop
-from armid.loop.result import report_of
-from armid.model import EFFECTS
-from armid.record import read_campaign
-from armid.registry import load_registry
-from calibration.campaigns import (
-    HIDDEN,
-    MACHINE,
-    PLANTS,
-    Task,
-    file_of,
-    former_file,
-    kept_answer,
-    tasks,
-    truth_file,
-)
+from armid.loop import report_of
+from calibration.campaigns import Task, file_of, former_file, kept_answer, tasks, truth_file
+from calibration.run import close
 
 KEPT = ("verdict", "parameters")
 
@@ -62,11 +48,8 @@ def closed(folder: Path, task: Task) -> str:
 
 def answer(folder: Path, task: Task) -> dict[str, Any]:
     entry = json.loads(truth_file(folder, task).read_text())
-    registry = load_registry([f"{PLANTS}:{entry['machine']}"] if task.family == MACHINE else [])
-    campaign = read_campaign(folder / "campaigns" / task.campaign, plants=registry.plants)
-    taken = {effect["name"] for effect in entry["effects"]} if task.family == HIDDEN else set()
-    candidates = {name: each for name, each in EFFECTS.items() if name not in taken} if taken else None
-    report = report_of(close_loop(campaign.model(registry.effects), campaign, candidates))
+    # all names of armid that `close` and `run.py` use are there in both versions
+    report = report_of(close(task, folder / "campaigns" / task.campaign, entry))
     return {key: report[key] for key in KEPT}
 
 

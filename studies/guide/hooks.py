@@ -50,16 +50,14 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
     up = "../" * page.file.src_uri.count("/")
-    markdown = INSERTED.sub(lambda m: ports_table() if m[1] == "ports" else listing(m[2]), markdown)
+    markdown = INSERTED.sub(
+        lambda m: ports_table() if m[1] == "ports" else f"```python\n{elsewhere(m[2])}```", markdown
+    )
     return OUTSIDE.sub(lambda m: f"![{m[2]}]({up}{m[3]})" if m[1] else f"{m[2]} (`{m[3]}`)", markdown)
 
 
 def elsewhere(path: str) -> str:
     return (ROOT / path).read_text(encoding="utf-8")
-
-
-def listing(path: str) -> str:
-    return f"```python\n{elsewhere(path)}```"
 
 
 def ports_table() -> str:

@@ -1,6 +1,5 @@
 """Write a drawn campaign: campaign.toml and a CSV file a record, and what the key tells of it."""
 
-import json
 from collections.abc import Mapping
 from typing import Any
 
@@ -140,8 +139,3 @@ def effect_entry(drawn: Drawn, i: int) -> dict[str, Any]:
         "moves": drawn.moves[i],
         "source": form.source,
     }
-
-
-def key_text(head: Mapping[str, Any], entries: Mapping[str, Any]) -> str:
-    """Return the key as JSON."""
-    return json.dumps({**head, "campaigns": entries}, indent=1) + "\n"

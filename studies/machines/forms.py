@@ -45,8 +45,8 @@ class Form:
     sizes: name -> (low, high, unit), drawn between; the first is the strength, which is 0 where the effect is not
     there. Units are SI, products of the machine's scales as in `SCALES`, or `command`, the largest command. A size with
     the unit "signed" is a share of the effort with a random sign.
-    act: (sizes, states, here) -> (value, rates of its states); of a sensor: (sizes, values (n_steps,), step [s]) ->
-    values. start, after: its states at the start and after each step.
+    act: (sizes, states, here) -> value, with states (value, their rates); of a sensor: (sizes, values (n_steps,), step
+    [s]) -> values. start, after: its states at the start and after each step.
     library: machine -> sets of effects of armid's library, each of which has this very form, () for none.
     fits: whether a machine may have it; a form that free parameters of its plant take over entirely does not fit.
     by_record: the strength grows from record to record, from 0 in the first.
@@ -111,13 +111,9 @@ def shows_bias(machine: Machine) -> bool:
     return machine.name not in ("elastic_joint", "hydraulic_boom")
 
 
-def records_angle(machine: Machine) -> bool:
-    return machine.outputs[0].state == 0
-
-
 def keep(s: Sizes, z: Any, here: Here) -> Any:
     """Return nothing: a late command is made by the integration."""
-    return 0.0, []
+    return 0.0
 
 
 def lag(s: Sizes, z: Any, here: Here) -> Any:
@@ -152,67 +148,45 @@ def drive_play(s: Sizes, z: Any, here: Here) -> Any:
 
 def rational(s: Sizes, z: Any, here: Here) -> Any:
     x = s["sharpness"] * np.abs(here.effort)
-    return -here.effort * x / (1.0 + x), []
+    return -here.effort * x / (1.0 + x)
 
 
 def droop(s: Sizes, z: Any, here: Here) -> Any:
     x = s["sharpness"] * here.effort**2
-    return -here.effort * x / (1.0 + x), []
+    return -here.effort * x / (1.0 + x)
 
 
 def hard_limit(s: Sizes, z: Any, here: Here) -> Any:
     most = 1.0 / np.maximum(s["sharpness"], 1e-9)
-    return np.clip(here.effort, -most, most) - here.effort, []
+    return np.clip(here.effort, -most, most) - here.effort
 
 
 def tanh_limit(s: Sizes, z: Any, here: Here) -> Any:
     x = np.maximum(s["sharpness"], 1e-9)
-    return np.tanh(x * here.effort) / x - here.effort, []
-
-
-def dead_zone(s: Sizes, z: Any, here: Here) -> Any:
-    return -np.clip(here.effort, -s["zone"], s["zone"]), []
+    return np.tanh(x * here.effort) / x - here.effort
 
 
 def threshold(s: Sizes, z: Any, here: Here) -> Any:
     """Return what a comparator takes: nothing comes below the zone, everything above it, over a tenth of the zone."""
     zone = np.maximum(s["zone"], 1e-12)
     passed = np.clip((np.abs(here.effort) - 0.95 * zone) / (0.1 * zone), 0.0, 1.0)
-    return np.where(s["zone"] > 0.0, here.effort * (passed - 1.0), 0.0), []
+    return np.where(s["zone"] > 0.0, here.effort * (passed - 1.0), 0.0)
 
 
 def one_sided(s: Sizes, z: Any, here: Here) -> Any:
     """Return what a valve with overlap on one edge alone takes (Merritt, section 5.2)."""
-    return -np.clip(here.effort, 0.0, s["zone"]), []
-
-
-def coulomb(s: Sizes, z: Any, here: Here) -> Any:
-    return -s["level"] * here.sign, []
-
-
-def stribeck(s: Sizes, z: Any, here: Here) -> Any:
-    return -s["level"] * (1.0 + s["excess"] * np.exp(-((here.v / s["fade"]) ** 2))) * here.sign, []
-
-
-def hess_soom(s: Sizes, z: Any, here: Here) -> Any:
-    return -s["level"] * (1.0 + s["excess"] / (1.0 + (here.v / s["fade"]) ** 2)) * here.sign, []
+    return -np.clip(here.effort, 0.0, s["zone"])
 
 
 def makkar(s: Sizes, z: Any, here: Here) -> Any:
     """Return -level (tanh(v/w) + excess (tanh(v/w) - tanh(v/fade))), differentiable."""
     sharp = np.tanh(here.v / (2.0 * WIDTH * here.machine.speed))
-    return -s["level"] * (sharp + s["excess"] * (sharp - np.tanh(here.v / s["fade"]))), []
+    return -s["level"] * (sharp + s["excess"] * (sharp - np.tanh(here.v / s["fade"])))
 
 
 def root_law(s: Sizes, z: Any, here: Here) -> Any:
     """Return a friction with the root of the speed, that of thin lubrication films."""
-    return -s["level"] * np.abs(here.v / here.machine.speed) ** 0.5 * here.sign, []
-
-
-def dahl(s: Sizes, z: Any, here: Here) -> Any:
-    width = WIDTH * here.machine.speed
-    size = here.v**2 / np.sqrt(here.v**2 + width**2)
-    return -s["level"] * z[0], [(here.v - size * z[0]) / s["way"]]
+    return -s["level"] * np.abs(here.v / here.machine.speed) ** 0.5 * here.sign
 
 
 def lugre(s: Sizes, z: Any, here: Here) -> Any:
@@ -220,6 +194,10 @@ def lugre(s: Sizes, z: Any, here: Here) -> Any:
     g = 1.0 + s["excess"] * np.exp(-((here.v / s["fade"]) ** 2))
     size = here.v**2 / np.sqrt(here.v**2 + width**2)
     return -s["level"] * z[0], [(here.v - size * z[0] / g) / s["way"]]
+
+
+def dahl(s: Sizes, z: Any, here: Here) -> Any:
+    return lugre({**s, "excess": 0.0, "fade": 1.0}, z, here)
 
 
 def maxwell_slip(s: Sizes, z: Any, here: Here) -> Any:
@@ -238,76 +216,28 @@ def carried(here: Here) -> Array:
 
 def load_friction(s: Sizes, z: Any, here: Here) -> Any:
     load, least = carried(here), 0.005 * here.machine.effort
-    return -s["share"] * load**2 / np.sqrt(load**2 + least**2) * here.sign, []
-
-
-def quadratic_load(s: Sizes, z: Any, here: Here) -> Any:
-    return -s["share"] * carried(here) ** 2 / here.machine.effort * here.sign, []
+    return -s["share"] * load**2 / np.sqrt(load**2 + least**2) * here.sign
 
 
 def faded_load(s: Sizes, z: Any, here: Here) -> Any:
     """Return a friction with the load that fades with the speed (Wojewoda et al. 2008)."""
-    return -s["share"] * np.abs(carried(here)) * np.exp(-np.abs(here.v) / s["fade"]) * here.sign, []
-
-
-def ripple(s: Sizes, z: Any, here: Here) -> Any:
-    return s["level"] * np.sin(s["waves"] * here.q + s["phase"]), []
+    return -s["share"] * np.abs(carried(here)) * np.exp(-np.abs(here.v) / s["fade"]) * here.sign
 
 
 def two_harmonics(s: Sizes, z: Any, here: Here) -> Any:
     a = s["waves"] * here.q + s["phase"]
-    return s["level"] * (np.sin(a) + s["second"] * np.sin(2.0 * a - s["phase"])), []
+    return s["level"] * (np.sin(a) + s["second"] * np.sin(2.0 * a - s["phase"]))
 
 
 def triangle(s: Sizes, z: Any, here: Here) -> Any:
     a = s["waves"] * here.q + s["phase"]
-    return s["level"] * (2.0 / np.pi) * np.arcsin(0.98 * np.sin(a)), []
-
-
-def drive_ripple(s: Sizes, z: Any, here: Here) -> Any:
-    return s["level"] * here.effort * np.sin(s["waves"] * here.q + s["phase"]), []
-
-
-def asymmetric_viscous(s: Sizes, z: Any, here: Here) -> Any:
-    return -s["slope"] * here.v * here.sign, []
-
-
-def asymmetric_gain(s: Sizes, z: Any, here: Here) -> Any:
-    return -s["share"] * np.maximum(here.effort, 0.0), []
-
-
-def asymmetric_coulomb(s: Sizes, z: Any, here: Here) -> Any:
-    return -s["level"] * (here.sign + s["difference"]), []
-
-
-def constant_effort(s: Sizes, z: Any, here: Here) -> Any:
-    return s["level"] + 0.0 * here.q, []
-
-
-def wandering(s: Sizes, z: Any, here: Here) -> Any:
-    return s["level"] * np.sin(2.0 * np.pi * here.t / s["period"]) + 0.0 * here.q, []
-
-
-def warming_up(s: Sizes, z: Any, here: Here) -> Any:
-    return s["level"] * (1.0 - np.exp(-here.t / s["period"])) + 0.0 * here.q, []
-
-
-def gain_error(s: Sizes, z: Any, here: Here) -> Any:
-    return -s["loss"] * here.effort, []
-
-
-def fading_gain(s: Sizes, z: Any, here: Here) -> Any:
-    return -s["loss"] * (1.0 - np.exp(-here.t / s["period"])) * here.effort, []
+    return s["level"] * (2.0 / np.pi) * np.arcsin(0.98 * np.sin(a))
 
 
 def heated_gain(s: Sizes, z: Any, here: Here) -> Any:
     """Return the effort that a warm magnet lacks; its warmth follows the square of the effort over 5 s."""
     warmth = (here.effort / here.machine.effort) ** 2
     return -s["loss"] * np.minimum(z[0], 1.0) * here.effort, [warmth - 0.2 * z[0]]
-
-
-def speed_gain(s: Sizes, z: Any, here: Here) -> Any:
-    return -s["loss"] * np.minimum(np.abs(here.v) / here.machine.speed, 1.0) * here.effort, []
 
 
 def late_sensor(s: Sizes, y: Array, h: float) -> Array:
@@ -343,28 +273,8 @@ def sensor_play(s: Sizes, y: Array, h: float) -> Array:
     return seen
 
 
-def sensor_bias(s: Sizes, y: Array, h: float) -> Array:
-    return y + s["level"]
-
-
 def from_command(s: Sizes, here: Here) -> list[Array]:
     return [here.u, np.zeros_like(here.u)]
-
-
-def from_effort(s: Sizes, here: Here) -> list[Array]:
-    return [here.effort]
-
-
-def gap_after(s: Sizes, z: Any, here: Here) -> list[Array]:
-    return [drive_play(s, z, here)[0]]
-
-
-def behind_winding(machine: Machine) -> bool:
-    return machine.volts
-
-
-def without_winding(machine: Machine) -> bool:
-    return not machine.volts
 
 
 BOOK = "Armstrong-Helouvry, Dupont, Canudas de Wit 1994, doi:10.1016/0005-1098(94)90209-7"
@@ -383,9 +293,9 @@ FORMS = (
     Form("dead_time", "beating", "command", {**LATE, "period": (0.3, 2.0, "s")}, keep,
          "Nilsson, Bernhardsson, Wittenmark 1998, doi:10.1016/S0005-1098(97)00170-2"),
     Form("lag", "voltage", "signal", {"time": (0.005, 0.05, "s")}, lag, "Leonhard, Control of Electrical Drives",
-         named("drive_lag"), 1, from_command, fits=behind_winding),
+         named("drive_lag"), 1, from_command, fits=lambda machine: machine.volts),
     Form("lag", "actuator", "drive", {"time": (0.02, 0.3, "s")}, effort_lag, "doi:10.1109/MRA.2012.2206474",
-         named("drive_lag"), 1, from_effort, fits=without_winding),
+         named("drive_lag"), 1, lambda s, here: [here.effort], fits=lambda machine: not machine.volts),
     Form("lag", "second_order", "signal", {"time": (0.008, 0.06, "s"), "damping": (0.3, 0.8, "1")}, second_lag,
          "Merritt, Hydraulic Control Systems, chapter 7", n_states=2, start=from_command),
     Form("lag", "rate_limit", "signal", {"slowness": (0.05, 0.5, "s/command")}, rate_limit,
@@ -403,16 +313,21 @@ FORMS = (
          named("drive_saturation")),
     Form("saturation", "tanh", "drive", {"sharpness": (0.8, 2.5, "1/effort")}, tanh_limit,
          "Ljung, System Identification, section 5.2 (Wiener and Hammerstein)", named("drive_saturation")),
-    Form("dead_zone", "subtracting", "drive", ZONE, dead_zone, TAO, named("dead_zone")),
+    Form("dead_zone", "subtracting", "drive", ZONE,
+         lambda s, z, here: -np.clip(here.effort, -s["zone"], s["zone"]), TAO, named("dead_zone")),
     Form("dead_zone", "threshold", "drive", ZONE, threshold, "Horowitz and Hill, The Art of Electronics, section 4.3"),
     Form("dead_zone", "one_sided", "drive", ZONE, one_sided, "Merritt, Hydraulic Control Systems, section 5.2"),
-    Form("dry_friction", "coulomb", "torque", DRY, coulomb, BOOK, named("coulomb")),
-    Form("dry_friction", "stribeck", "torque", FADING, stribeck, BOOK, together("coulomb", "stribeck")),
+    Form("dry_friction", "coulomb", "torque", DRY, lambda s, z, here: -s["level"] * here.sign, BOOK, named("coulomb")),
+    Form("dry_friction", "stribeck", "torque", FADING,
+         lambda s, z, here: -s["level"] * (1.0 + s["excess"] * np.exp(-((here.v / s["fade"]) ** 2))) * here.sign,
+         BOOK, together("coulomb", "stribeck")),
     Form("dry_friction", "dahl", "torque", {**DRY, "way": (0.003, 0.03, "speed*s")}, dahl,
          "doi:10.1016/S0947-3580(98)70113-X", named("presliding"), 1),
     Form("dry_friction", "lugre", "torque", {**FADING, "way": (0.003, 0.03, "speed*s")}, lugre, "doi:10.1109/9.376053",
          named("presliding"), 1),
-    Form("dry_friction", "hess_soom", "torque", FADING, hess_soom, "Hess and Soom 1990, doi:10.1115/1.2920240",
+    Form("dry_friction", "hess_soom", "torque", FADING,
+         lambda s, z, here: -s["level"] * (1.0 + s["excess"] / (1.0 + (here.v / s["fade"]) ** 2)) * here.sign,
+         "Hess and Soom 1990, doi:10.1115/1.2920240",
          together("coulomb", "stribeck")),
     Form("dry_friction", "makkar", "torque", FADING, makkar, "Makkar et al. 2005, doi:10.1109/AIM.2005.1511048"),
     Form("dry_friction", "root", "torque", {"level": (0.1, 0.4, "effort")}, root_law, BOOK),
@@ -420,46 +335,56 @@ FORMS = (
          "doi:10.1109/TAC.2005.858676", n_states=3),
     Form("load_friction", "proportional", "torque", {"share": (0.1, 0.5, "1")}, load_friction, "arXiv:2410.08650",
          named("load_friction")),
-    Form("load_friction", "quadratic", "torque", {"share": (0.2, 1.0, "1")}, quadratic_load,
+    Form("load_friction", "quadratic", "torque", {"share": (0.2, 1.0, "1")},
+         lambda s, z, here: -s["share"] * carried(here) ** 2 / here.machine.effort * here.sign,
          "Wojewoda et al. 2008, doi:10.1098/rsta.2007.2125"),
     Form("load_friction", "fading", "torque", {"share": (0.2, 0.8, "1"), "fade": (0.05, 0.3, "speed")}, faded_load,
          "Wojewoda et al. 2008, doi:10.1098/rsta.2007.2125"),
     Form("backlash", "coupling", "play", {"gap": (0.01, 0.05, "1")}, keep, TAO, named("backlash"),
          fits=lambda machine: machine.name == "elastic_joint"),
     Form("backlash", "drive_play", "signal", {"gap": (0.02, 0.15, "command")}, drive_play,
-         "Tao and Kokotovic 1995, doi:10.1109/9.341778", n_states=1, start=lambda s, here: [here.u], after=gap_after),
+         "Tao and Kokotovic 1995, doi:10.1109/9.341778", n_states=1, start=lambda s, here: [here.u],
+         after=lambda s, z, here: [drive_play(s, z, here)[0]]),
     Form("backlash", "sensor_play", "sensor", {"gap": (0.005, 0.05, "angle")}, sensor_play,
-         "Nordin and Gutman 2002, doi:10.1016/S0005-1098(02)00047-X", fits=records_angle),
-    Form("cogging", "sine", "torque", {"level": (0.02, 0.15, "effort"), **WAVES}, ripple,
+         "Nordin and Gutman 2002, doi:10.1016/S0005-1098(02)00047-X", fits=lambda m: m.outputs[0].state == 0),
+    Form("cogging", "sine", "torque", {"level": (0.02, 0.15, "effort"), **WAVES},
+         lambda s, z, here: s["level"] * np.sin(s["waves"] * here.q + s["phase"]),
          "Holtz and Springob 1996, IEEE Trans. Industrial Electronics 43(2)", named("torque_ripple", "cogging")),
     Form("cogging", "two_harmonics", "torque", {"level": (0.02, 0.1, "effort"), **WAVES, "second": (0.4, 1.0, "1")},
          two_harmonics, "Islam, Mir, Sebastian 2004, doi:10.1109/TIA.2004.827469", named("cogging")),
     Form("cogging", "triangle", "torque", {"level": (0.02, 0.15, "effort"), **WAVES}, triangle,
          "Hanselman, Brushless Permanent Magnet Motor Design, chapter 5"),
-    Form("cogging", "with_drive", "drive", {"level": (0.05, 0.3, "1"), **WAVES}, drive_ripple,
+    Form("cogging", "with_drive", "drive", {"level": (0.05, 0.3, "1"), **WAVES},
+         lambda s, z, here: s["level"] * here.effort * np.sin(s["waves"] * here.q + s["phase"]),
          "Jahns and Soong 1996, doi:10.1109/41.491355"),
-    Form("asymmetry", "viscous", "torque", {"slope": (0.03, 0.2, "effort/speed")}, asymmetric_viscous,
+    Form("asymmetry", "viscous", "torque", {"slope": (0.03, 0.2, "effort/speed")},
+         lambda s, z, here: -s["slope"] * here.v * here.sign,
          "Janot, Gautier, Brunot 2019", named("asymmetric_viscous")),
-    Form("asymmetry", "coulomb", "torque", {**DRY, "difference": (0.2, 0.7, "1")}, asymmetric_coulomb,
+    Form("asymmetry", "coulomb", "torque", {**DRY, "difference": (0.2, 0.7, "1")},
+         lambda s, z, here: -s["level"] * (here.sign + s["difference"]),
          "Janot, Gautier, Brunot 2019", together("coulomb", "torque_offset")),
-    Form("asymmetry", "gain", "drive", {"share": (0.05, 0.3, "1")}, asymmetric_gain,
+    Form("asymmetry", "gain", "drive", {"share": (0.05, 0.3, "1")},
+         lambda s, z, here: -s["share"] * np.maximum(here.effort, 0.0),
          "Merritt, Hydraulic Control Systems, chapter 6 (cylinders with a rod)",
          together("drive_asymmetry", "drive_gain")),
-    Form("offset", "constant", "torque", {"level": (0.02, 0.12, "signed")}, constant_effort,
+    Form("offset", "constant", "torque", {"level": (0.02, 0.12, "signed")},
+         lambda s, z, here: s["level"] + 0.0 * here.q,
          "Janot, Gautier, Brunot 2019", named("torque_offset")),
-    Form("offset", "sensor", "sensor", {"level": (0.01, 0.05, "speed")}, sensor_bias, DOEBELIN,
+    Form("offset", "sensor", "sensor", {"level": (0.01, 0.05, "speed")}, lambda s, y, h: y + s["level"], DOEBELIN,
          lambda machine: (("gyro_bias",),) if machine.outputs[0].state == 1 else of_sensor("bias")(machine),
          fits=shows_bias),
-    Form("offset", "wandering", "torque", {"level": (0.02, 0.12, "signed"), "period": (1.0, 6.0, "s")}, wandering,
-         DOEBELIN),
-    Form("offset", "warming_up", "torque", {"level": (0.03, 0.15, "signed"), "period": (0.5, 4.0, "s")}, warming_up,
-         DOEBELIN),
-    Form("drifted_gain", "between_records", "drive", {"loss": (0.1, 0.4, "1")}, gain_error, "doi:10.1115/1.4027506",
-         by_record=True),
-    Form("drifted_gain", "fading", "drive", {"loss": (0.1, 0.4, "1"), "period": (0.5, 4.0, "s")}, fading_gain,
+    Form("offset", "wandering", "torque", {"level": (0.02, 0.12, "signed"), "period": (1.0, 6.0, "s")},
+         lambda s, z, here: s["level"] * np.sin(2.0 * np.pi * here.t / s["period"]) + 0.0 * here.q, DOEBELIN),
+    Form("offset", "warming_up", "torque", {"level": (0.03, 0.15, "signed"), "period": (0.5, 4.0, "s")},
+         lambda s, z, here: s["level"] * (1.0 - np.exp(-here.t / s["period"])) + 0.0 * here.q, DOEBELIN),
+    Form("drifted_gain", "between_records", "drive", {"loss": (0.1, 0.4, "1")},
+         lambda s, z, here: -s["loss"] * here.effort, "doi:10.1115/1.4027506", by_record=True),
+    Form("drifted_gain", "fading", "drive", {"loss": (0.1, 0.4, "1"), "period": (0.5, 4.0, "s")},
+         lambda s, z, here: -s["loss"] * (1.0 - np.exp(-here.t / s["period"])) * here.effort,
          "Hughes and Drury, Electric Motors and Drives, chapter 3"),
     Form("drifted_gain", "heated", "drive", {"loss": (0.1, 0.5, "1")}, heated_gain, "IEC 60034-1", n_states=1),
-    Form("drifted_gain", "with_speed", "drive", {"loss": (0.1, 0.4, "1")}, speed_gain,
+    Form("drifted_gain", "with_speed", "drive", {"loss": (0.1, 0.4, "1")},
+         lambda s, z, here: -s["loss"] * np.minimum(np.abs(here.v) / here.machine.speed, 1.0) * here.effort,
          "Hanselman, Brushless Permanent Magnet Motor Design, chapter 4"),
 )  # fmt: skip
 FAMILIES = tuple(dict.fromkeys(form.family for form in FORMS))

@@ -99,8 +99,10 @@ class Equations:
         here, changes = self.moment(k, part, x), []
         added = {"drive": np.zeros_like(x[0]), "torque": np.zeros_like(x[0])}
         for i, (each, s) in enumerate(zip(self.acting, self.sizes, strict=True)):
-            value, rates = each.form.act(s, x[self.own(i)], here)
-            changes += rates
+            value = each.form.act(s, x[self.own(i)], here)
+            if each.form.n_states:
+                value, rates = value
+                changes += rates
             if each.form.place == "signal":
                 here.u, here.effort = value, self.machine.drive(self.numbers, value, x[1])
             else:

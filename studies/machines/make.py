@@ -12,26 +12,15 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from machines.campaign import files_of, key_text
+from machines.campaign import files_of
 from machines.catalogue import MACHINES
 from machines.draw import drawn, plan
-
-LARGEST = 2**32
-"""Seeds lie below this, so that they fit any generator."""
-
-
-class RefusalError(Exception):
-    """Say in one sentence why nothing is made."""
-
-
-class Parser(argparse.ArgumentParser):
-    """Refuse with one sentence, where argparse prints the usage as well."""
-
-    def error(self, message: str) -> NoReturn:
-        raise RefusalError(message)
+from stand import RefusalError
+from stand.blind.many import LARGEST
+from stand.campaign import write_files
+from stand.command import Parser, carry_out
 
 
 def main(words: Sequence[str]) -> int:
@@ -43,15 +32,7 @@ def main(words: Sequence[str]) -> int:
     parser.add_argument("--seed", type=int, required=True, help="seed of all that is drawn")
     parser.add_argument("--count", type=int, required=True, help="number of campaigns")
     parser.add_argument("--only", default="", metavar="MACHINE,...", help=f"of {', '.join(MACHINES)}; default: all")
-    try:
-        print(make(parser.parse_args(words)))
-    except RefusalError as refusal:
-        print(f"make.py: {refusal}", file=sys.stderr)
-        return 2
-    except OSError as error:
-        print(f"make.py: {error.filename} cannot be written: {error.strerror}", file=sys.stderr)
-        return 2
-    return 0
+    return carry_out(make, words, parser)
 
 
 def make(options: argparse.Namespace) -> str:
@@ -75,13 +56,16 @@ def make(options: argparse.Namespace) -> str:
         if {name: kept.get(name) for name in head} != head:
             raise RefusalError(f"{part} belongs to another seed, count or choice of machines: a new folder is expected")
         entries = kept["campaigns"]
-    folder.mkdir(parents=True, exist_ok=True)
-    for index in range(options.count):
-        name = f"c{index:03d}"
-        if name not in entries:
-            entries[name] = write_campaign(folder / name, options.seed, index, names)
-            replaced(part, key_text(head, entries))
-    part.rename(key)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for index in range(options.count):
+            name = f"c{index:03d}"
+            if name not in entries:
+                entries[name] = write_campaign(folder / name, options.seed, index, names)
+                replaced(part, json.dumps({**head, "campaigns": entries}, indent=1) + "\n")
+        part.rename(key)
+    except OSError as error:
+        raise RefusalError(f"{error.filename} cannot be written: {error.strerror}") from error
     n_effects = sum(len(entry["effects"]) for entry in entries.values())
     n_unlisted = sum(not effect["listed"] for entry in entries.values() for effect in entry["effects"])
     return (f"{options.folder}: {options.count} campaigns, SYNTHETIC, with {n_effects} effects, {n_unlisted} in forms "
@@ -92,9 +76,7 @@ def write_campaign(folder: Path, seed: int, index: int, names: Sequence[str]) ->
     """Write one campaign and return its entry in the key."""
     planned, rng = plan(seed, index, names)
     files, entry = files_of(folder.name, drawn(planned, rng), rng)
-    folder.mkdir(exist_ok=True)
-    for file, content in files.items():
-        (folder / file).write_bytes(content.encode())
+    write_files(folder, files)
     return {"index": index, **entry}
 
 

@@ -8,6 +8,10 @@ The simulator never reads this file. Sources of the equations: `source` of each 
 import numpy as np
 
 from armid import Constant, Guard, Input, Output, Parameter, Plant, Scales, State
+from armid.model.effect import zero
+from armid.model.plants.driven_axis import gravity_effort, recorded_speed, rotary_speed_rate
+from armid.model.plants.flexible_link import CONTACTS
+from armid.model.plants.rotary_arm import recorded_angle
 
 G = 9.81
 
@@ -15,11 +19,6 @@ G = 9.81
 def current(voltage, winding, motor_constant, v, resistance):
     """Current of the motor [A]; effects add to the voltage at `winding`."""
     return (voltage + winding - motor_constant * v) / resistance
-
-
-def motor_effort(motor_constant, current):
-    """Effort of the motor [N m, N]."""
-    return motor_constant * current
 
 
 def motor_voltage(duty, supply):
@@ -42,11 +41,6 @@ def cart_voltage(kp, target, q):
     return kp * (target - q)
 
 
-def hanging_weight(gravity_moment, q):
-    """Torque of gravity [N m], q = 0 hanging."""
-    return -gravity_moment * np.sin(q)
-
-
 def hanging_mass(mass, length, q):
     """Torque of gravity [N m], q = 0 hanging."""
     return -mass * G * length * np.sin(q)
@@ -67,16 +61,6 @@ def boom_drop(load_drop, q):
     return -load_drop * np.cos(q)
 
 
-def motor_torque(torque_constant, current_in):
-    """Torque of the motor [N m]."""
-    return torque_constant * current_in
-
-
-def play_half(play):
-    """Half the play of the joint [rad]; effects alone bring one."""
-    return play
-
-
 def joint_torque(twist, twist_speed, stiffness, joint_damping, series_compliance, play_half, coupling):
     """Torque of the joint on the motor [N m]."""
     stretch = twist - np.maximum(np.minimum(twist, play_half), -play_half)
@@ -90,36 +74,6 @@ def motor_acceleration(drive_effort, drive, joint_torque, torque, damping, v, mo
     return (drive_effort + drive + joint_torque + torque - damping * v) / motor_inertia
 
 
-def recorded_speed(v, output):
-    """Speed as recorded [rad/s]."""
-    return v + output
-
-
-def recorded_angle(q, angle_sensor):
-    """Angle as recorded [rad]."""
-    return q + angle_sensor
-
-
-def recorded_position(q, position_sensor):
-    """Position as recorded [m]."""
-    return q + position_sensor
-
-
-def recorded_motor_angle(q, motor_angle_sensor):
-    """Angle of the motor as recorded [rad]."""
-    return q + motor_angle_sensor
-
-
-def recorded_twist(twist, twist_sensor):
-    """Twist of the joint as recorded [rad]."""
-    return twist + twist_sensor
-
-
-def position_rate(v):
-    """Rate of the position [rad/s, m/s]."""
-    return v
-
-
 def level_rate(drive_effort, drive, torque, inertia):
     """Acceleration of a level shaft [rad/s2]."""
     return (drive_effort + drive + torque) / inertia
@@ -128,11 +82,6 @@ def level_rate(drive_effort, drive, torque, inertia):
 def damped_rate(drive_effort, drive, torque, damping, v, inertia):
     """Acceleration of a damped wheel [rad/s2]."""
     return (drive_effort + drive + torque - damping * v) / inertia
-
-
-def weighted_rate(drive_effort, drive, gravity_effort, torque, inertia):
-    """Acceleration under a weight [rad/s2]."""
-    return (drive_effort + drive + gravity_effort + torque) / inertia
 
 
 def servo_rate(drive_effort, drive, gravity_effort, torque, mass, length, armature):
@@ -155,70 +104,15 @@ def boom_rate(drive_effort, drive, gravity_effort, torque, v, lag):
     return (drive_effort + drive + gravity_effort + torque - v) / lag
 
 
-def motor_rate(motor_acceleration):
-    """Acceleration of the motor [rad/s2]."""
-    return motor_acceleration
-
-
-def twist_rate(twist_speed):
-    """Rate of the twist [rad/s]."""
-    return twist_speed
-
-
 def twist_speed_rate(joint_torque, load_inertia, motor_acceleration):
     """Acceleration of the twist [rad/s2]."""
     return -joint_torque / load_inertia - motor_acceleration
 
 
-def nought():
-    """Position at the first sample: counted from there."""
-    return 0.0
-
-
-def first_position(start_position):
-    """Position at the first sample."""
-    return start_position
-
-
-def first_speed(start_speed):
-    """Speed at the first sample."""
-    return start_speed
-
-
-def first_twist(start_twist):
-    """Twist at the first sample [rad]."""
-    return start_twist
-
-
-def first_twist_speed(start_twist_speed):
-    """Speed of the twist at the first sample [rad/s]."""
-    return start_twist_speed
-
-
-def upper_limit(wanted_duty):
-    """Duty below its upper limit."""
-    return wanted_duty - 1.0
-
-
-def lower_limit(wanted_duty):
-    """Duty above its lower limit."""
-    return wanted_duty + 1.0
-
-
-def upper_contact(twist, play_half):
-    """Way to the contact on the one side [rad]."""
-    return twist - play_half
-
-
-def lower_contact(twist, play_half):
-    """Way to the contact on the other side [rad]."""
-    return twist + play_half
-
-
-def turning(rate, first=first_position, unit="rad"):
-    """Return position and speed as states."""
-    return (State("q", unit, position_rate, first, f"position_state_{unit}"),
-            State("v", f"{unit}/s", rate, first_speed, f"speed_state_{unit}_s"))  # fmt: skip
+def turning(rate, first=lambda start_position: start_position, unit="rad"):
+    """Return position and speed as states; first: the position at the first sample."""
+    return (State("q", unit, lambda v: v, first, f"position_state_{unit}"),
+            State("v", f"{unit}/s", rate, lambda start_speed: start_speed, f"speed_state_{unit}_s"))  # fmt: skip
 
 
 def starts(unit="rad"):
@@ -229,7 +123,7 @@ def starts(unit="rad"):
 
 SPEED = Constant("start_speed", 0.0, "rad/s", "set from the record")
 ALIASES = {"omega": "v", "theta": "q", "speed": "v", "position": "q"}
-MOTOR = {"current": current, "drive_effort": motor_effort}
+MOTOR = {"current": current, "drive_effort": lambda motor_constant, current: motor_constant * current}
 INERTIA = Parameter("inertia", "kg m2", 5e-5, 0.02, nominal=1e-3, note="of everything that turns")
 MOTOR_CONSTANT = Parameter("motor_constant", "N m/A", 0.01, 0.5, nominal=0.1, note="also in V s/rad")
 RESISTANCE = Constant("resistance", 1.5, "ohm", "of winding and leads")
@@ -238,7 +132,7 @@ ANGLE = (Output("angle", "recorded_angle", "rad", port="angle_sensor"),)
 
 motor_disc = Plant(
     name="motor_disc", note="DC motor with a disc: J dv/dt = k (u - k v) / R",
-    parameters=(INERTIA, MOTOR_CONSTANT), states=turning(level_rate, nought),
+    parameters=(INERTIA, MOTOR_CONSTANT), states=turning(level_rate, zero),
     quantities={**MOTOR, "recorded_speed": recorded_speed}, constants=(RESISTANCE, SPEED),
     inputs=(Input("volts", "V", ("volts_V",), typical=(-12.0, 12.0)),),
     ports={"torque": "N m", "drive": "N m", "winding": "V", "output": "rad/s"},
@@ -252,7 +146,7 @@ wheel_pwm = Plant(
         Parameter("motor_constant", "N m/A", 0.05, 2.0, nominal=0.45, note="also in V s/rad"),
         Parameter("damping", "N m s/rad", 0.0, 0.2, nominal=0.01, note="viscous"),
     ),
-    states=turning(damped_rate, nought),
+    states=turning(damped_rate, zero),
     quantities={**MOTOR, "voltage": motor_voltage, "recorded_speed": recorded_speed}, constants=(RESISTANCE, SPEED),
     inputs=(Input("duty", "1", ("duty_1",), typical=(-1.0, 1.0)), SUPPLY),
     ports={"torque": "N m", "drive": "N m", "winding": "V", "output": "rad/s"}, aliases=ALIASES,
@@ -262,8 +156,8 @@ unbalanced_disc = Plant(
     name="unbalanced_disc", note="disc with an eccentric weight on a DC motor: J dv/dt = k (u - k v) / R - M sin q",
     parameters=(INERTIA, MOTOR_CONSTANT,
                 Parameter("gravity_moment", "N m", 1e-3, 0.2, nominal=0.03, note="weight times its distance")),
-    states=turning(weighted_rate),
-    quantities={**MOTOR, "gravity_effort": hanging_weight, "recorded_angle": recorded_angle},
+    states=turning(rotary_speed_rate),
+    quantities={**MOTOR, "gravity_effort": gravity_effort, "recorded_angle": recorded_angle},
     constants=(RESISTANCE, *starts()), inputs=(Input("volts", "V", ("volts_V",), typical=(-6.0, 6.0)),),
     ports={"torque": "N m", "drive": "N m", "winding": "V", "angle_sensor": "rad"},
     aliases={**ALIASES, "voltage": "volts", "load_effort": "gravity_effort"}, outputs=ANGLE,
@@ -283,7 +177,8 @@ position_servo = Plant(
                Constant("kp", 4.0, "1/rad", "gain of the servo", tolerance=0.0), *starts()),
     inputs=(Input("goal", "rad", ("goal_rad",), typical=(-1.0, 1.0)), SUPPLY),
     ports={"torque": "N m", "drive": "N m", "winding": "V", "angle_sensor": "rad"},
-    guards=(Guard("upper_limit", upper_limit), Guard("lower_limit", lower_limit)),
+    guards=(Guard("upper_limit", lambda wanted_duty: wanted_duty - 1.0),
+            Guard("lower_limit", lambda wanted_duty: wanted_duty + 1.0)),
     aliases={**ALIASES, "load_effort": "gravity_effort"}, outputs=ANGLE, scales=Scales(effort=0.6, speed=8.0),
     from_rest=False,
 )  # fmt: skip
@@ -295,7 +190,7 @@ propeller_pendulum = Plant(
         Parameter("damping", "N m s/rad", 0.0, 0.3, nominal=0.015, note="viscous"),
     ),
     states=turning(propeller_rate),
-    quantities={"drive_effort": propeller_moment, "gravity_effort": hanging_weight, "recorded_angle": recorded_angle},
+    quantities={"drive_effort": propeller_moment, "gravity_effort": gravity_effort, "recorded_angle": recorded_angle},
     constants=(Constant("gravity_moment", 0.5, "N m", "weight times its distance"), *starts()),
     inputs=(Input("throttle", "1", ("throttle_1",), typical=(-1.0, 1.0)),),
     ports={"torque": "N m", "drive": "N m", "angle_sensor": "rad"},
@@ -309,7 +204,8 @@ cart = Plant(
         Parameter("motor_constant", "N/A", 0.5, 50.0, nominal=6.0, note="at the rail; also in V s/m"),
     ),
     states=turning(cart_rate, unit="m"),
-    quantities={**MOTOR, "voltage": cart_voltage, "recorded_position": recorded_position},
+    quantities={**MOTOR, "voltage": cart_voltage,
+                "recorded_position": lambda q, position_sensor: q + position_sensor},
     constants=(RESISTANCE, Constant("kp", 50.0, "V/m", "gain of the controller", tolerance=0.0), *starts("m")),
     inputs=(Input("target", "m", ("target_m",), typical=(-0.15, 0.15)),),
     ports={"torque": "N", "drive": "N", "winding": "V", "position_sensor": "m"}, aliases=ALIASES,
@@ -340,11 +236,16 @@ elastic_joint = Plant(
         Parameter("damping", "N m s/rad", 0.0, 3.0, nominal=0.2, note="viscous, of the motor"),
         Parameter("joint_damping", "N m s/rad", 0.0, 1.0, nominal=0.03, note="viscous, of the joint"),
     ),
-    states=(*turning(motor_rate), State("twist", "rad", twist_rate, first_twist, "twist_state_rad"),
-            State("twist_speed", "rad/s", twist_speed_rate, first_twist_speed, "twist_speed_state_rad_s")),
-    quantities={"drive_effort": motor_torque, "motor_acceleration": motor_acceleration, "play_half": play_half,
-                "joint_torque": joint_torque, "recorded_motor_angle": recorded_motor_angle,
-                "recorded_twist": recorded_twist},
+    states=(*turning(lambda motor_acceleration: motor_acceleration),
+            State("twist", "rad", lambda twist_speed: twist_speed, lambda start_twist: start_twist, "twist_state_rad"),
+            State("twist_speed", "rad/s", twist_speed_rate, lambda start_twist_speed: start_twist_speed,
+                  "twist_speed_state_rad_s")),
+    quantities={
+        "drive_effort": lambda torque_constant, current_in: torque_constant * current_in,
+        "motor_acceleration": motor_acceleration, "play_half": lambda play: play, "joint_torque": joint_torque,
+        "recorded_motor_angle": lambda q, motor_angle_sensor: q + motor_angle_sensor,
+        "recorded_twist": lambda twist, twist_sensor: twist + twist_sensor,
+    },
     constants=(
         Constant("torque_constant", 0.5, "N m/A", "of the motor, at the joint"), *starts(),
         Constant("start_twist", 0.0, "rad", "set from the record"),
@@ -353,7 +254,7 @@ elastic_joint = Plant(
     inputs=(Input("current_in", "A", ("current_A",), typical=(-5.0, 5.0)),),
     ports={"torque": "N m", "drive": "N m", "play": "rad", "series_compliance": "rad/(N m)", "coupling": "N m",
            "motor_angle_sensor": "rad", "twist_sensor": "rad"},
-    guards=(Guard("upper_contact", upper_contact), Guard("lower_contact", lower_contact)),
+    guards=CONTACTS,
     aliases={**ALIASES, "load_effort": "joint_torque"},
     outputs=(Output("motor_angle", "recorded_motor_angle", "rad", port="motor_angle_sensor"),
              Output("twist", "recorded_twist", "rad", port="twist_sensor")),

@@ -3,7 +3,7 @@
 import json
 import os
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -40,6 +40,13 @@ def campaign_text(
         told |= {"repeat_of": record.repeat_of} if record.repeat_of else {}
         lines += ["", "[[records]]", *(f"{key} = {json.dumps(value)}" for key, value in told.items())]
     return "\n".join([*lines, *constants, ""])
+
+
+def write_files(folder: Path, files: Mapping[str, str]) -> None:
+    """Write texts into a folder, which is made where it is not there."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in files.items():
+        (folder / name).write_bytes(text.encode())
 
 
 def check_place(folder: Path, force: bool, stranger: Callable[[list[str]], str], *beside: Path) -> None:

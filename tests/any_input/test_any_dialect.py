@@ -69,7 +69,6 @@ def test_what_is_read_is_what_was_written(rows, dialect):
     style["trailing"] = style["separator"] if tail else ""
     text = written(rows, **style)
     table, said = read(text.encode(encoding))
-    whole = [len(name) for name in NAMES]
     if style["separator"] == "," == style["point"] and not style["quotes"] and "," in text.split(style["end"])[-2]:
         # no reader can tell: a file of whole numbers is plain, all others have to be refused
         printed = [style["form"].format(v) for row in rows for v in row]
@@ -78,7 +77,6 @@ def test_what_is_read_is_what_was_written(rows, dialect):
             return
     if table is None:
         assert "expected" in said
-        assert len(whole) == 3
         return
     printed = np.array([[float(style["form"].format(v)) for v in row] for row in rows])
     found = np.column_stack([table.columns[name] for name in NAMES])

@@ -30,7 +30,7 @@ from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
 from armid.engine import compile_model, simulate
 model = Model(PLANTS["driven_axis"]) + EFFECTS["viscous"]
 found = simulate(model, Manoeuvre(0.01, 50, inputs={"u": np.ones(50)}), [[1.0, 0.5]])
-kernel, _ = compile_model(model)
+kernel = compile_model(model)
 hits, misses = (sum(n.values()) for n in (kernel.stats.cache_hits, kernel.stats.cache_misses))
 print(json.dumps({"hits": hits, "misses": misses, "last": found.output[0, -1]}))
 """
@@ -92,16 +92,15 @@ def test_a_module_is_named_by_its_equations(tmp_path):
         'def torque(omega: float, level: float) -> float:\n    """Say something."""\n    return -level*omega  # so\n',
     ]  # fmt: skip
     models = [Model(PLANTS["driven_axis"]) + effect_of(tmp_path, t) for t in texts]
-    names = [module_name(kernel_parts(m, 8)) for m in models]
+    names = [module_name(kernel_parts(m)) for m in models]
     assert len(set(names[:-1])) == len(texts) - 1
     assert names[-1] == names[0]
-    assert names[0] != module_name(kernel_parts(models[0], 4))
 
 
 def test_a_cache_that_cannot_be_written_is_done_without(tmp_path, monkeypatch):
     (tmp_path / "a file").write_text("")
     monkeypatch.setenv("ARMID_CACHE", str(tmp_path / "a file" / "cache"))
-    parts = kernel_parts(Model(PLANTS["driven_axis"]), 2)
+    parts = kernel_parts(Model(PLANTS["driven_axis"]))
     monkeypatch.delitem(sys.modules, module_name(parts), raising=False)
     with pytest.warns(UserWarning, match=r"compiled code is not kept: .*cannot be used \(Not a directory\)"):
         assert load_module(parts).simulate
@@ -124,7 +123,7 @@ def test_ctrl_c_that_numba_loses_ends_all_the_same(tmp_path, monkeypatch):
 
 def test_a_damaged_module_is_written_again(tmp_path, monkeypatch):
     monkeypatch.setenv("ARMID_CACHE", str(tmp_path))
-    parts = kernel_parts(Model(PLANTS["driven_axis"]), 2)
+    parts = kernel_parts(Model(PLANTS["driven_axis"]))
     name = module_name(parts)
     monkeypatch.delitem(sys.modules, name, raising=False)
     load_module(parts)
@@ -195,9 +194,8 @@ def test_models_run_in_packed_instructions(monkeypatch):
         pytest.skip("this processor has neither AVX2 nor AVX-512, whose instructions are looked for")
     # A kernel that comes from the cache cannot show its instructions: it is compiled anew.
     model = Model(PLANTS["driven_axis"]) + EFFECTS["coulomb"] + EFFECTS["viscous"]
-    kernel, width = compile_model(model)
-    fresh = numba.njit(error_model="numpy", nogil=True)(kernel.py_func)
-    monkeypatch.setattr(importlib.import_module("armid.engine.simulate"), "compile_model", lambda _: (fresh, width))
+    fresh = numba.njit(error_model="numpy", nogil=True)(compile_model(model).py_func)
+    monkeypatch.setattr(importlib.import_module("armid.engine.simulate"), "compile_model", lambda _: fresh)
     simulate(model, Manoeuvre(0.001, 9, inputs={"u": np.ones(9)}), [[1.0, 0.5, 0.01, 0.5]])
     text = "\n".join(fresh.inspect_asm().values())
     arithmetic = r"\bv(?:add|sub|mul|div|sqrt|fn?m(?:add|sub)\d+)"

@@ -12,12 +12,10 @@ import pytest
 from numpy.typing import NDArray
 
 from armid.engine import simd_math as lane_numpy
-from armid.engine.simd import make_access, store
+from armid.engine.simd import LANE_WIDTH, load, splat, store
 from armid.engine.simd_math import FAR_ANGLE
 
 Array = NDArray[np.float64]
-WIDTH = 8
-load, splat = make_access(WIDTH)
 EPS = np.finfo(float).eps
 CORNERS = np.array([0.0, 1.0, -1.0, 0.5, -0.5, 2.0, -2.0, 1e-300, -1e-300, 1e-8, -1e-8, np.pi, 709.5, -707.0,
                     1e5, -1e5, 1e9, 1e17, -1e200, 1e300, np.inf, -np.inf, np.nan])  # fmt: skip
@@ -135,10 +133,10 @@ def results():
     lines = [f"store(out, {k} * n + i, splat(0.0) + 1.0 * ({c.text}))" for k, c in enumerate(ALL)]
     loads = [f"x, y = load(given, {2 * k} * n + i), load(given, {2 * k + 1} * n + i)" for k in range(len(ALL))]
     body = "\n".join(f"        {load}\n        {line}" for load, line in zip(loads, lines))
-    text = f"def apply(given, n, out):\n    for i in range(0, n, {WIDTH}):\n{body}\n"
+    text = f"def apply(given, n, out):\n    for i in range(0, n, {LANE_WIDTH}):\n{body}\n"
     names = {"np": np, "math": math, "load": load, "store": store, "splat": splat}
     exec(text, names)
-    n = -(-max(c.inputs.shape[1] for c in ALL) // WIDTH) * WIDTH
+    n = -(-max(c.inputs.shape[1] for c in ALL) // LANE_WIDTH) * LANE_WIDTH
     given = np.ones((len(ALL), 2, n))
     for k, case in enumerate(ALL):
         given[k, :, : case.inputs.shape[1]] = case.inputs

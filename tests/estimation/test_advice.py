@@ -123,7 +123,7 @@ def made(model, manoeuvre, window, rng, file):
     """Return the record that the truth gives, with noise."""
     run = simulate(model, manoeuvre, candidate(model)[np.newaxis], Schedule(4))
     measured = run.output[0] + NOISE * rng.normal(size=manoeuvre.n_samples)
-    piece, noise = Piece(manoeuvre, window), Noise(NOISE, 0.0, 0.0, 1.0, 1000, "rest")
+    piece, noise = Piece(manoeuvre, window), Noise(NOISE, 0.0, 1.0, 1000, "rest")
     return Record(file, "train", manoeuvre, (Signal("", "rad/s", measured, np.empty(0), noise),), (piece,), (piece,))
 
 

@@ -27,7 +27,7 @@ MINIMAX = Fitness("minimax", lambda measured, simulated: np.abs(simulated - meas
 def stroke(lowering_replays):
     """One stroke of the arm, of which the noise is known and the motion is that of the truth."""
     replay = lowering_replays[0]
-    noise = Noise(NOISE, 0.0, 0.0, 1.0, 400, "rest")
+    noise = Noise(NOISE, 0.0, 1.0, 400, "rest")
     return noisy(replay.changed(record=with_noise(replay.record, **vars(noise))), 1)
 
 

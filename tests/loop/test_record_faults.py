@@ -166,7 +166,7 @@ def test_hum_is_noise(campaign, sound):
         phase = rng.random()
         hum = size * (np.sin(2.0 * np.pi * (50.04 * times + phase)) + 0.3 * np.sin(2.0 * np.pi * 150.12 * times))
         rest, measured = record.rest + hum[: len(record.rest)], record.measured + hum[len(record.rest) :]
-        noise = noise_of(rest, measured, record.manoeuvre.interval)
+        noise = noise_of(rest, measured)
         return record.with_signals(lambda signal: replace(signal, rest=rest, measured=measured, noise=noise))
 
     found = close_loop(Model(ARM), replace(campaign, records=tuple(map(humming, campaign.records))), CANDIDATES)

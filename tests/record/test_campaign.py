@@ -108,8 +108,6 @@ def test_parameters_by_either_spelling(write_two, text):
 
 
 @pytest.mark.parametrize("encode", [
-    lambda text: b"\xef\xbb\xbf" + text,
-    lambda text: text.replace(b"\n", b"\r\n"),
     lambda text: text.replace(b"\n", b"\n\n"),
     lambda text: text.replace(b"time_s,angular_velocity_deg_s", b'"time_s", "angular_velocity_deg_s"'),
     lambda text: text.replace(b",", b" , ")[:-1],

@@ -132,17 +132,16 @@ def rng():
 
 
 def test_white_rest_of_any_length(rng):
-    noise = noise_of(0.02 + rng.normal(0, 0.005, 20_000), MOTION, INTERVAL)
+    noise = noise_of(0.02 + rng.normal(0, 0.005, 20_000), MOTION)
     assert noise.source == "rest"
     assert noise.n_samples == 20_000
     assert noise.mean == pytest.approx(0.02, abs=2e-4)
     assert noise.rms == pytest.approx(0.005, rel=0.03)
     assert noise.effective_fraction > 0.95
-    assert noise.correlation_time_s < 0.2 * INTERVAL
-    fractions = [noise_of(rng.normal(0, 1, 100), MOTION, INTERVAL).effective_fraction for _ in range(200)]
+    fractions = [noise_of(rng.normal(0, 1, 100), MOTION).effective_fraction for _ in range(200)]
     assert np.median(fractions) == 1.0
     alternating = np.diff(rng.normal(0, 1, 20_001))
-    assert noise_of(alternating, MOTION, INTERVAL).effective_fraction == 1.0
+    assert noise_of(alternating, MOTION).effective_fraction == 1.0
 
 
 def test_a_sensor_that_is_stuck_tells_nothing_of_its_noise_and_a_silent_rest_that_of_its_steps(rng):
@@ -154,14 +153,14 @@ def test_a_sensor_that_is_stuck_tells_nothing_of_its_noise_and_a_silent_rest_tha
     # a quiet sensor of coarse steps repeats itself, and is not stuck: its noise is that of its steps
     coarse = np.round(MOTION / 0.05) * 0.05
     assert difference_rms(coarse) < 0.01
-    assert noise_of(np.zeros(0), coarse, INTERVAL).rms >= 0.05 / np.sqrt(12) * (1 - 1e-9)
+    assert noise_of(np.zeros(0), coarse).rms >= 0.05 / np.sqrt(12) * (1 - 1e-9)
     for level in (0.0, 0.1):
-        noise = noise_of(np.full(100, level), MOTION, INTERVAL)
-        assert (noise.correlation_time_s, noise.effective_fraction) == (0.0, 1.0)
+        noise = noise_of(np.full(100, level), MOTION)
+        assert noise.effective_fraction == 1.0
         # the rounding of the largest value is left
         assert 0.0 < noise.rms < 1e-15
         assert noise.mean == pytest.approx(level)
-    noise = noise_of(np.zeros(100), np.round(MOTION, 2), INTERVAL)
+    noise = noise_of(np.zeros(100), np.round(MOTION, 2))
     assert noise.rms == pytest.approx(0.01 / np.sqrt(12))
 
 
@@ -169,15 +168,14 @@ def test_a_sensor_that_is_stuck_tells_nothing_of_its_noise_and_a_silent_rest_tha
 def test_coloured_rest(rng, time_constant):
     phi = np.exp(-INTERVAL / time_constant)
     rest = lfilter([0.005 * np.sqrt(1 - phi**2)], [1, -phi], rng.normal(size=100_000))
-    noise = noise_of(rest, MOTION, INTERVAL)
+    noise = noise_of(rest, MOTION)
     assert noise.rms == pytest.approx(0.005, rel=0.05)
-    assert noise.correlation_time_s == pytest.approx(time_constant, rel=0.1)
     assert noise.effective_fraction == pytest.approx((1 - phi) / (1 + phi), rel=0.1)
 
 
 @pytest.mark.parametrize("n_rest", [0, 49, 100])
 def test_few_rest_samples_or_such_as_read_one_value_leave_the_differences(rng, n_rest):
-    noise = noise_of(np.zeros(n_rest), MOTION + rng.normal(0, 0.005, MOTION.size), INTERVAL)
+    noise = noise_of(np.zeros(n_rest), MOTION + rng.normal(0, 0.005, MOTION.size))
     assert (noise.source, noise.n_samples) == ("differences", MOTION.size)
     assert n_rest == 100 or noise.mean is None
     assert noise.rms == pytest.approx(0.005, rel=0.1)
@@ -195,7 +193,7 @@ def test_a_rest_between_motions_tells_the_noise_where_the_input_is_still_too(rng
     rest = rest_between(measured, still, True)
     assert rest.size >= 200
     assert np.std(rest) == pytest.approx(0.005, rel=0.2)
-    noise = noise_of(rest, measured, INTERVAL)
+    noise = noise_of(rest, measured)
     assert (noise.source, noise.mean) == ("rest", pytest.approx(0.02, abs=2e-3))
     # under drive a stick is not a rest, an even speed is not a standstill, and a still input does not hold a machine
     assert rest_between(measured, np.zeros(3000, dtype=bool), True).size == 0
@@ -229,5 +227,5 @@ def test_a_coarse_sensor_tells_its_noise_by_the_motion_where_its_step_hides_it_a
     for own in (0.3, 0.4, 0.5):
         rests = np.round(rng.uniform(-0.5, 0.5, (20, 1)) + rng.normal(0, own, (20, 150)))
         moved = np.round(motion + rng.normal(0, own, (20, motion.size)))
-        sized = [noise_of(rest, one, INTERVAL).rms for rest, one in zip(rests, moved, strict=True)]
+        sized = [noise_of(rest, one).rms for rest, one in zip(rests, moved, strict=True)]
         assert np.array(sized) == pytest.approx(np.sqrt(own**2 + 1 / 12), rel=0.13)

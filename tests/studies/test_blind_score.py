@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pandas as pd
 import pytest
-from made_up import made_entry, made_report
+from made_up import made_entry, made_report, report
 
 from blind import advice, families, score, tables
 from stand.score.judge import Claim
@@ -39,12 +39,8 @@ def made(advised, random):
     for choice, found in (("advised", advised), ("random", random)):
         for i, good in enumerate(found):
             name = f"a{i:02d}_{choice}"
-            steps = [{"effect": "coulomb", "alternatives": [] if good else ["brush_drop"], "claimed": good}]
-            verdict, probable = (
-                ("explained", {"coulomb": 1.0}) if good else ("cannot_tell_apart", dict.fromkeys(PAIR, 0.5))
-            )
-            reports[name] = {"verdict": verdict, "also": [], "effects": ["coulomb"], "steps": steps,
-                             "probabilities": {"effects": probable}}  # fmt: skip
+            step = ("coulomb", () if good else ("brush_drop",), good)
+            reports[name] = report("explained" if good else "cannot_tell_apart", step)
             key[name] = {"class": "pair", "pair": PAIR, "choice": choice, "base": f"a{i:02d}", "power": 0.9, "rank": 1,
                          "tried": 9, "in_doubt": 7, "effects": [{"name": "coulomb"}], "noise": {"kind": "white"},
                          "next": {"shell": True}}  # fmt: skip
@@ -77,18 +73,12 @@ def family(name, truths=(), fault=None, constants=None, dirt="none"):
 
 
 def said(*steps, suspects=(), after=0.005, value=1.0, half=0.004, verdict="explained"):
-    """Return a report: steps as (effect, alternatives, claimed), suspects as (record, kind), all parameters alike.
-
-    A group is as probable as a claim.
-    """
-    probable = {name: 0.99 / (1 + len(a)) for e, a, c in steps for name in (e, *a) if c or a}
+    """Return a report of some steps with suspects as (record, kind), all parameters alike."""
     found = {n: {"value": v * value, "low": v * (value - half), "high": v * (value + half), "trusted": True,
                  "interval_holds": True, "noise_low": v * (value - half / 2.0), "noise_high": v * (value + half / 2.0)}
              for n, v in family("control")["parameters"].items()}  # fmt: skip
-    return {
-        "verdict": verdict, "also": [], "effects": [s[0] for s in steps], "withdrawn": None,
-        "parameters": {"after": found}, "probabilities": {"effects": probable},
-        "steps": [{"effect": e, "alternatives": list(a), "claimed": c, "empirical": False} for e, a, c in steps],
+    return report(verdict, *steps) | {
+        "withdrawn": None, "parameters": {"after": found},
         "suspects": [{"record": record, "kind": kind} for record, kind in suspects],
         "error": {when: {"holdout": {"rmse": rmse}} for when, rmse in (("before", 0.006), ("after", after))},
     }  # fmt: skip

@@ -138,12 +138,8 @@ def test_a_committed_campaign_can_be_made_again(name, tmp_path, monkeypatch):
             assert (again / file.name).read_text() == file.read_text()
 
 
-def test_committed_campaigns_are_small_and_say_their_truth():
+def test_committed_campaigns_are_small_and_share_a_record():
     for name in STORIES:
         assert sum(file.stat().st_size for file in (CAMPAIGNS / name).iterdir()) < 500_000
-        said = (CAMPAIGNS / name / "README.md").read_text()
-        assert "SYNTHETIC" in said
-        truth = {"paper_arm": "p0 = 3050000 Pa", "rocking_shell": "rocking_hz"}.get(name, "coulomb = 25")
-        assert truth in said, name
     one, four = ((CAMPAIGNS / name / "lower.csv").read_bytes() for name in ("one_stroke", "four_strokes"))
     assert one == four

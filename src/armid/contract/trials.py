@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from armid.engine import probes
 from armid.errors import ArmidError
 from armid.model import Array, Effect, Input, Manoeuvre, Model, Parameter, Plant
-from armid.model.graph import LATE_LEAVES, Node
+from armid.model.graph import LATE_LEAVES
 
 TRIAL_SAMPLES, TRIAL_INTERVAL = 401, 2e-3
 # The moment of gravity that a hanging axis gets, as a share of the effort scale.
@@ -201,7 +201,6 @@ class PlainModel:
         self.manoeuvre, self.inputs = manoeuvre, {i.name: i.hold or manoeuvre.hold for i in model.plant.inputs}
         guards = [n.key for n in self.graph.of_kind("guard")]
         self.kinks = [g for g in guards if g.removeprefix("guard__") not in self.latches]
-        self.orders: dict[tuple[str, ...], list[Node]] = {}
         self.n_rates = 0
         # the sample whose value a held input has, and a time inside the piece that is integrated
         self.sample, self.middle = 0, manoeuvre.start_time
@@ -210,11 +209,7 @@ class PlainModel:
         self.pieces: list[tuple[float, Any]] = []
 
     def evaluate(self, keys: list[str], values: dict[str, Any]) -> list[Any]:
-        known = self.known | values
-        if tuple(keys) not in self.orders:
-            self.orders[tuple(keys)] = self.graph.order(keys)
-        for node in self.orders[tuple(keys)]:
-            known[node.key] = node.value(known)
+        known = self.graph.values(keys, self.known | values)
         return [known[k] for k in keys]
 
     def start(self) -> Array:

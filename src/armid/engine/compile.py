@@ -31,7 +31,7 @@ from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from armid.engine import generate, simd, simd_math
-from armid.engine.generate import KernelParts, kernel_parts
+from armid.engine.generate import KernelParts, kernel_parts, kernel_text
 from armid.errors import ArmidError
 from armid.model import Model
 from armid.progress import announced
@@ -200,12 +200,10 @@ def unusable(folder: Path) -> str:
 
 
 UNCOMPILABLE = (NumbaError, UnsupportedBytecodeError)
-# One register of AVX-512, two of AVX2. Measured on the arm: 16 lanes are slower, because their values no longer fit.
-LANE_WIDTH = 8
 Kernel = Callable[..., Any]
 # What a generated module is made by and compiled from.
 MADE_FROM = [*generate.TEMPLATES, *(Path(str(module.__file__)) for module in (generate, simd, simd_math))]
-KERNELS: WeakKeyDictionary[Model, tuple[Kernel, int]] = WeakKeyDictionary()
+KERNELS: WeakKeyDictionary[Model, Kernel] = WeakKeyDictionary()
 # Threads that ask for the same model at once share one kernel, which numba then compiles once.
 LOCK = RLock()
 # Kernels, by `id`, that are being compiled.
@@ -213,12 +211,12 @@ COMPILING: set[int] = set()
 MOST_COMPILED = 3
 
 
-def compile_model(model: Model) -> tuple[Kernel, int]:
-    """Return `simulate` of a model, compiled at its first call, and its lane width; a model is compiled once."""
+def compile_model(model: Model) -> Kernel:
+    """Return `simulate` of a model, compiled at its first call; a model is compiled once."""
     with LOCK:
         if model not in KERNELS:
-            kernel = load_module(kernel_parts(model, LANE_WIDTH)).simulate
-            KERNELS[model] = (keep(kernel, kernel.py_func.__module__), LANE_WIDTH)
+            kernel = load_module(kernel_parts(model)).simulate
+            KERNELS[model] = keep(kernel, kernel.py_func.__module__)
         return KERNELS[model]
 
 
@@ -264,7 +262,7 @@ def load_module(parts: KernelParts) -> ModuleType:
         return sys.modules[name]
     file = f"{name}.py" if folder is None else str(folder / f"{name}.py")
     content = None if folder is None else read_whole(Path(f"{file}.bin"))
-    text = parts.text() if content is None else content.decode()
+    text = kernel_text(parts) if content is None else content.decode()
     if folder is not None and content is None:
         write_whole(Path(f"{file}.bin"), text.encode())
     module = ModuleType(name)

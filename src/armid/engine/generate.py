@@ -17,6 +17,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from armid.engine.transpile import SourceText, local_name
 from armid.model import Model
@@ -55,83 +56,61 @@ class Late:
     delay: int
 
 
-@dataclass(frozen=True)
-class KernelParts:
-    """Hold what the template is filled with: local names of one model, and its equations.
-
-    equations: text of the functions `fixed_values`, `start_values`, `rates`, `guards`, `recorded` and what they call.
-    width: candidates side by side. parameters, constants: what each candidate is given, in order.
-    fixed: quantities that do not move, computed once. states, inputs, latches: what moves, each in its order.
-    outputs: recorded signals. latch_guards: the guard of each latch; kinks: the other guards; driven_start: whether a
-    state starts where the inputs say; jumping_guards: whether a kink may jump at a sample, as only inputs do. wide:
-    whether there are so many effects that what is rarely needed is compiled but once. delays: sums of parameters by
-    which inputs and states are late; the motion sees the first n_moving of them, and they cut each sample interval
-    where inputs drive it, as what is late jumps or bends there. late_inputs, late_states: what is late, by which delay.
-    """
-
-    equations: str
-    width: int
-    parameters: list[str]
-    constants: list[str]
-    fixed: list[str]
-    states: list[str]
-    inputs: list[str]
-    latches: list[str]
-    outputs: list[str]
-    latch_guards: list[str]
-    kinks: list[str]
-    driven_start: bool
-    jumping_guards: bool
-    wide: bool
-    delays: list[str]
-    n_moving: int
-    late_inputs: list[Late]
-    late_states: list[Late]
-
-    def text(self) -> str:
-        # Imported here: a module that is in the cache is not generated again.
-        from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-        environment = Environment(
-            variable_start_string="{", variable_end_string="}", trim_blocks=True, lstrip_blocks=True,
-            keep_trailing_newline=True, undefined=StrictUndefined, loader=FileSystemLoader(TEMPLATE.parent),
-        )  # fmt: skip
-        environment.filters |= {"each": each, "listed": listed, "nested": nested}
-        guards = [*self.latch_guards, *self.kinks]
-        times = [f"time_of_{k}" for k in self.latches]
-        carried = [*self.latches, *times, *self.states, *(f"ga_{g}" for g in guards)]
-        late_inputs, late_states = ([one.name for one in late] for late in (self.late_inputs, self.late_states))
-        driven = [*self.inputs, *late_inputs]
-        prefixed = ((self.states, OF_STATES), (driven, OF_INPUTS), (self.outputs, OF_OUTPUTS), (guards, OF_GUARDS),
-                    (carried, OF_CARRIED), (late_states, OF_LATE_STATES))  # fmt: skip
-        lists = {prefix: listed(names, f"{prefix}_") for names, prefixes in prefixed for prefix in prefixes}
-        lists |= {
-            "x": listed(self.states), "x_n": listed(self.states, "n_"), "fixed": listed(self.fixed),
-            "latches": listed(self.latches), "latches_n": listed(self.latches, "n_"), "times": listed(times),
-            "new": listed(self.latches, "new_"), "given": listed(self.parameters + self.constants),
-        }  # fmt: skip
-        lists["judging"] = f"judged, {listed(self.states, 'per_')}"
-        names = vars(self) | {"latch_names": self.latches}
-        remembered = list(dict.fromkeys(one.of for one in self.late_states))
-        numbers = [str(i) for i in range(len(self.delays))]
-        of_delays = [listed(numbers, f"{word}_") for word in ("late_by", "whole", "rest", "using")]
-        given = "delayed, history, steps_kept, place, per_part, part, edges, numbers, " + "".join(of_delays)
-        names |= {
-            "driven": driven, "late_names": late_states, "remembered": remembered, "late_by": of_delays[0],
-            "late_by_names": [f"late_by_{i}" for i in range(len(self.delays))],
-            "late_given": given if self.late_states else "",
-            "last_rates": listed(remembered, "k4_"), "n_cutting": self.n_moving if self.inputs else 0,
-            "felt": sorted({one.delay for one in self.late_states if one.delay < self.n_moving}),
-            "delays_of_states": {one.delay for one in self.late_states},
-        }  # fmt: skip
-        return environment.get_template(TEMPLATE.name).render(
-            names | lists, guards=guards, carried=carried, block=BLOCK, max_cuts=MAX_CUTS, longest=LONGEST_SPAN,
-            switches=list(zip(self.latches, self.latch_guards, strict=True)),
-        )  # fmt: skip
+# What the template is filled with: local names of one model, and its equations.
+#
+# equations: text of the functions `fixed_values`, `start_values`, `rates`, `guards`, `recorded` and what they call.
+# parameters, constants: what each candidate is given, in order. fixed: quantities that do not move, computed once.
+# states, inputs, latches: what moves, each in its order. outputs: recorded signals. latch_guards: the guard of each
+# latch; kinks: the other guards; jumping_guards: whether a kink may jump at a sample, as only inputs do. wide: whether
+# there are so many effects that what is rarely needed is compiled but once. delays: sums of parameters by which inputs
+# and states are late; the motion sees the first n_moving of them, and they cut each sample interval where inputs drive
+# it, as what is late jumps or bends there. late_inputs, late_states: what is late, by which delay.
+KernelParts = dict[str, Any]
 
 
-def kernel_parts(model: Model, width: int) -> KernelParts:
-    return Emitter(model).parts(width)
+def kernel_parts(model: Model) -> KernelParts:
+    """Return what the module of a model is made of; its text is made only where the cache does not hold it."""
+    return Emitter(model).parts()
+
+
+def kernel_text(parts: KernelParts) -> str:
+    """Return the text of the module."""
+    # Imported here: a module that is in the cache is not generated again.
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        variable_start_string="{", variable_end_string="}", trim_blocks=True, lstrip_blocks=True,
+        keep_trailing_newline=True, undefined=StrictUndefined, loader=FileSystemLoader(TEMPLATE.parent),
+    )  # fmt: skip
+    environment.filters |= {"each": each, "listed": listed, "nested": nested}
+    states, inputs, latches, late_of = (parts[name] for name in ("states", "inputs", "latches", "late_states"))
+    guards = [*parts["latch_guards"], *parts["kinks"]]
+    times = [f"time_of_{k}" for k in latches]
+    carried = [*latches, *times, *states, *(f"ga_{g}" for g in guards)]
+    late_states = [one.name for one in late_of]
+    driven = [*inputs, *(one.name for one in parts["late_inputs"])]
+    prefixed = ((states, OF_STATES), (driven, OF_INPUTS), (parts["outputs"], OF_OUTPUTS), (guards, OF_GUARDS),
+                (carried, OF_CARRIED), (late_states, OF_LATE_STATES))  # fmt: skip
+    lists = {prefix: listed(names, f"{prefix}_") for names, prefixes in prefixed for prefix in prefixes}
+    lists |= {
+        "x": listed(states), "x_n": listed(states, "n_"), "fixed": listed(parts["fixed"]),
+        "latches": listed(latches), "latches_n": listed(latches, "n_"), "times": listed(times),
+        "new": listed(latches, "new_"), "given": listed(parts["parameters"] + parts["constants"]),
+        "judging": f"judged, {listed(states, 'per_')}",
+    }  # fmt: skip
+    remembered = list(dict.fromkeys(one.of for one in late_of))
+    numbers = [str(i) for i in range(len(parts["delays"]))]
+    of_delays = [listed(numbers, f"{word}_") for word in ("late_by", "whole", "rest", "using")]
+    given = "delayed, history, steps_kept, place, per_part, part, edges, numbers, " + "".join(of_delays)
+    return environment.get_template(TEMPLATE.name).render(
+        parts | {"latch_names": latches} | lists, guards=guards, carried=carried, driven=driven, late_names=late_states,
+        block=BLOCK, max_cuts=MAX_CUTS, longest=LONGEST_SPAN,
+        switches=list(zip(latches, parts["latch_guards"], strict=True)), remembered=remembered,
+        last_rates=listed(remembered, "k4_"), late_by=of_delays[0], late_by_names=[f"late_by_{i}" for i in numbers],
+        late_given=given if late_of else "", n_cutting=parts["n_moving"] if inputs else 0,
+        felt=sorted({one.delay for one in late_of if one.delay < parts["n_moving"]}),
+        delays_of_states={one.delay for one in late_of},
+    )  # fmt: skip
 
 
 def listed(names: list[str], prefix: str = "") -> str:
@@ -178,7 +157,7 @@ class Emitter:
         self.called: set[str] = set()
         self.strengths = strengths_of(model)
 
-    def parts(self, width: int) -> KernelParts:
+    def parts(self) -> KernelParts:
         model = self.model
         rates = [f"rate__{k.replace('.', '__')}" for k in model.states]
         latch_guards = [f"guard__{k.replace('.', '__')}" for k in model.latches]
@@ -192,19 +171,18 @@ class Emitter:
             "parameters": model.parameters, "constants": model.constants, "fixed": fixed, "states": model.states,
             "inputs": inputs, "latches": model.latches, "latch_guards": latch_guards, "kinks": kinks,
         }  # fmt: skip
-        names = {name: [variable(k) for k in keys] for name, keys in lists.items()}
+        names: KernelParts = {name: [variable(k) for k in keys] for name, keys in lists.items()}
         names["fixed"] += used
         names["outputs"] = [o.name for o in model.plant.outputs]
         given = [*names["parameters"], *names["constants"]]
         starts = [n.replace("rate__", "initial__", 1) for n in rates]
-        at_start = [variable(k) for k in ("time", *inputs)] if self.uses(starts, ["time", *inputs]) else []
         moving = [variable("time"), *names["latches"], *names["states"], *names["inputs"],
                   *(one.name for one in (*late_inputs, *late_states)), *names["fixed"]]  # fmt: skip
         switches = [line for effect, nulls in self.strengths.items() for line in use_lines(effect, nulls)]
         values = [f"1.0 * {variable(k)}" for k in fixed] + used
         texts = [
             self.function("fixed_values", given, self.assignments(fixed, True) + switches, values),
-            self.evaluation("start_values", given + at_start, starts, True),
+            self.evaluation("start_values", [*given, variable("time"), *names["inputs"]], starts, True),
             self.evaluation("rates", moving, rates),
             self.evaluation("guards", moving, guards),
             self.evaluation("recorded", moving, recorded),
@@ -213,10 +191,10 @@ class Emitter:
             texts.append(self.function("delay_values", given, [], [f"{by} + 0.0" for by in delays]))
         equations = self.function_texts() + "\n\n".join(texts)
         jumping = bool(kinks) and self.uses(guards, [*inputs, *(n.key for n in self.graph.of_kind("late_input"))])
-        return KernelParts(
-            equations, width, **names, driven_start=bool(at_start), jumping_guards=jumping, wide=bool(self.strengths),
-            delays=delays, n_moving=n_moving, late_inputs=late_inputs, late_states=late_states,
-        )  # fmt: skip
+        return names | {
+            "equations": equations, "jumping_guards": jumping, "wide": bool(self.strengths), "delays": delays,
+            "n_moving": n_moving, "late_inputs": late_inputs, "late_states": late_states,
+        }  # fmt: skip
 
     def late_leaves(self, moving: list[str], recorded: list[str]) -> tuple[list[str], int, list[Late], list[Late]]:
         """Return the delays of a model, how many of them the motion sees, and what is late by them.

@@ -84,9 +84,12 @@ LINKED = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper"
 RARE = LINKED | {"pipeline_class": LinkedApart, "forceinline": False}
 
 
+# Candidates side by side: one register of AVX-512, two of AVX2. Measured on the arm: 16 lanes are slower, because their
+# values no longer fit.
+LANE_WIDTH = 8
 DOUBLE = ir.DoubleType()
 INT32 = ir.IntType(32)
-INT64 = ir.IntType(64)
+VECTOR, WHOLE_NUMBERS = ir.VectorType(DOUBLE, LANE_WIDTH), ir.VectorType(ir.IntType(64), LANE_WIDTH)
 NUMBER_TYPES = (types.Float, types.Integer, types.Boolean)
 # No `nnan` or `ninf`: a diverging candidate must stay visible as NaN or infinity. No `reassoc`: the order in which an
 # equation is written is the order in which it is computed.
@@ -94,15 +97,10 @@ FLAGS = ("contract", "nsz", "arcp")
 
 
 class Lanes(types.Type):  # type: ignore[misc]
-    """Numba type of `width` doubles that are computed together."""
+    """Numba type of doubles that are computed together."""
 
-    def __init__(self, width: int) -> None:
-        self.width = width
-        super().__init__(name=f"lanes{width}")
 
-    @property
-    def key(self) -> int:
-        return self.width
+LANES_TYPE = Lanes(f"lanes{LANE_WIDTH}")
 
 
 @register_model(Lanes)
@@ -110,7 +108,7 @@ class LanesModel(models.PrimitiveModel):  # type: ignore[misc]
     """Store the lanes as one LLVM vector."""
 
     def __init__(self, dmm: Any, fe_type: Lanes) -> None:
-        super().__init__(dmm, fe_type, vector_of(fe_type.width))
+        super().__init__(dmm, fe_type, VECTOR)
 
 
 def is_number(numba_type: Any) -> bool:
@@ -122,40 +120,32 @@ def mixes_lanes(*given: Any) -> bool:
     return any(isinstance(t, Lanes) for t in given) and all(isinstance(t, (Lanes, *NUMBER_TYPES)) for t in given)
 
 
-def broadcast(builder: Any, value: Any, width: int) -> Any:
-    empty = ir.Constant(vector_of(width), ir.Undefined)
+def broadcast(builder: Any, value: Any) -> Any:
+    empty = ir.Constant(VECTOR, ir.Undefined)
     first = builder.insert_element(empty, value, ir.Constant(INT32, 0))
-    return builder.shuffle_vector(first, empty, ir.Constant(ir.VectorType(INT32, width), [0] * width))
+    return builder.shuffle_vector(first, empty, ir.Constant(ir.VectorType(INT32, LANE_WIDTH), [0] * LANE_WIDTH))
 
 
-def to_lanes(context: Any, builder: Any, value: Any, numba_type: Any, width: int) -> Any:
+def to_lanes(context: Any, builder: Any, value: Any, numba_type: Any) -> Any:
     """Return the LLVM vector of a value that is a number or already lanes."""
     if isinstance(numba_type, Lanes):
         return value
-    return broadcast(builder, context.cast(builder, value, numba_type, types.float64), width)
+    return broadcast(builder, context.cast(builder, value, numba_type, types.float64))
 
 
-def lanes_of(*numba_types: Any) -> Lanes:
-    return next(t for t in numba_types if isinstance(t, Lanes))
-
-
-def vector_of(width: int) -> Any:
-    return ir.VectorType(DOUBLE, width)
-
-
-def vector_pointer(context: Any, builder: Any, signature: Any, arguments: Any, width: int) -> Any:
+def vector_pointer(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     """Return the pointer to lanes in a contiguous float64 array; the arguments begin with the array and an index."""
     i = context.cast(builder, arguments[1], signature.args[1], types.intp)
     data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
-    return builder.bitcast(builder.gep(data, [i], source_etype=DOUBLE), vector_of(width).as_pointer())
+    return builder.bitcast(builder.gep(data, [i], source_etype=DOUBLE), VECTOR.as_pointer())
 
 
 def on_lanes(compute: Callable[..., Any]) -> Callable[..., Any]:
-    """Return code whose arguments all become lanes of one width; compute(builder, vectors...): its LLVM value."""
+    """Return code whose arguments all become lanes; compute(builder, vectors...): its LLVM value."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        width, values = lanes_of(*signature.args).width, zip(arguments, signature.args, strict=True)
-        return compute(builder, *(to_lanes(context, builder, v, t, width) for v, t in values))
+        values = zip(arguments, signature.args, strict=True)
+        return compute(builder, *(to_lanes(context, builder, v, t) for v, t in values))
 
     return generate
 
@@ -165,26 +155,20 @@ def elementwise(result: Any, compute: Callable[..., Any], *given: Any) -> tuple[
     return result(*given), on_lanes(compute)
 
 
-def make_access(width: int) -> tuple[Any, Any]:
-    """Return `load(array, index)` and `splat(number)` for lanes of a width."""
-    lanes = Lanes(width)
+@intrinsic
+def load(typing_context, array, index):
+    """Return lanes from a contiguous float64 array from an index on."""
 
-    @intrinsic
-    def load(typing_context, array, index):
-        def generate(context, builder, signature, arguments):
-            pointer = vector_pointer(context, builder, signature, arguments, width)
-            return builder.load(pointer, align=8, typ=vector_of(width))
+    def generate(context, builder, signature, arguments):
+        return builder.load(vector_pointer(context, builder, signature, arguments), align=8, typ=VECTOR)
 
-        return lanes(array, index), generate
+    return LANES_TYPE(array, index), generate
 
-    @intrinsic
-    def splat(typing_context, number):
-        def generate(context, builder, signature, arguments):
-            return to_lanes(context, builder, arguments[0], signature.args[0], width)
 
-        return lanes(number), generate
-
-    return load, splat
+@intrinsic
+def splat(typing_context, number):
+    """Return lanes that all hold a number."""
+    return elementwise(LANES_TYPE, lambda builder, x: x, number)
 
 
 @intrinsic
@@ -193,9 +177,9 @@ def gather(typing_context, array, places):
 
     def generate(context, builder, signature, arguments):
         data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
-        indices = builder.fptosi(arguments[1], ir.VectorType(INT64, places.width))
-        result = ir.Constant(vector_of(places.width), ir.Undefined)
-        for i in range(places.width):
+        indices = builder.fptosi(arguments[1], WHOLE_NUMBERS)
+        result = ir.Constant(VECTOR, ir.Undefined)
+        for i in range(LANE_WIDTH):
             place = builder.extract_element(indices, ir.Constant(INT32, i))
             value = builder.load(builder.gep(data, [place], source_etype=DOUBLE), align=8, typ=DOUBLE)
             result = builder.insert_element(result, value, ir.Constant(INT32, i))
@@ -209,7 +193,7 @@ def store(typing_context, array, index, value):
     """Write lanes to a contiguous float64 array from an index on."""
 
     def generate(context, builder, signature, arguments):
-        builder.store(arguments[2], vector_pointer(context, builder, signature, arguments, value.width), align=8)
+        builder.store(arguments[2], vector_pointer(context, builder, signature, arguments), align=8)
         return context.get_dummy_value()
 
     return types.void(array, index, value), generate
@@ -242,14 +226,6 @@ def with_lane(typing_context, value, index, number):
     return value(value, index, number), generate
 
 
-@intrinsic
-def n_lanes(typing_context, value):
-    def generate(context, builder, signature, arguments):
-        return context.get_constant(types.intp, value.width)
-
-    return types.intp(value), generate
-
-
 def define_operator(python_operator: Any, compute: Callable[..., Any]) -> None:
     """Give numba the operator for lanes with lanes and lanes with numbers.
 
@@ -258,7 +234,7 @@ def define_operator(python_operator: Any, compute: Callable[..., Any]) -> None:
 
     @type_callable(python_operator)
     def operator_type(context):
-        return lambda a, b: lanes_of(a, b) if mixes_lanes(a, b) else None
+        return lambda a, b: LANES_TYPE if mixes_lanes(a, b) else None
 
     for pair in ((Lanes, Lanes), *((Lanes, n) for n in NUMBER_TYPES), *((n, Lanes) for n in NUMBER_TYPES)):
         lower_builtin(python_operator, *pair)(on_lanes(compute))
@@ -266,7 +242,7 @@ def define_operator(python_operator: Any, compute: Callable[..., Any]) -> None:
 
 def comparison(symbol: str) -> Callable[..., Any]:
     def compute(builder: Any, x: Any, y: Any) -> Any:
-        true, false = (broadcast(builder, ir.Constant(DOUBLE, c), x.type.count) for c in (1.0, 0.0))
+        true, false = (broadcast(builder, ir.Constant(DOUBLE, c)) for c in (1.0, 0.0))
         compare = builder.fcmp_unordered if symbol == "!=" else builder.fcmp_ordered
         return builder.select(compare(symbol, x, y), true, false)
 
@@ -288,9 +264,8 @@ def negate(typing_context, a):
 
 
 def vector_call(builder: Any, name: str, *vectors: Any) -> Any:
-    vector = vectors[0].type
-    kind = ir.FunctionType(vector, [vector] * len(vectors))
-    function = builder.module.declare_intrinsic(f"llvm.{name}.v{vector.count}f64", (), kind)
+    kind = ir.FunctionType(VECTOR, [VECTOR] * len(vectors))
+    function = builder.module.declare_intrinsic(f"llvm.{name}.v{LANE_WIDTH}f64", (), kind)
     return builder.call(function, vectors)
 
 
@@ -313,7 +288,7 @@ floor_of = unary("floor")
 @intrinsic
 def fused(typing_context, a, b, c):
     """Return a b + c with one rounding, never reordered."""
-    return elementwise(lanes_of(a, b, c), lambda builder, *vectors: vector_call(builder, "fma", *vectors), a, b, c)
+    return elementwise(LANES_TYPE, lambda builder, *vectors: vector_call(builder, "fma", *vectors), a, b, c)
 
 
 @intrinsic
@@ -323,7 +298,7 @@ def select(typing_context, a, b, x, y):
     def compute(builder, p, q, r, s):
         return builder.select(builder.fcmp_ordered(">", p, q), r, s)
 
-    return elementwise(lanes_of(a, b, x, y), compute, a, b, x, y)
+    return elementwise(LANES_TYPE, compute, a, b, x, y)
 
 
 @intrinsic
@@ -331,15 +306,15 @@ def any_above(typing_context, a, b):
     """Tell whether a > b in any lane."""
 
     def compute(builder, x, limit):
-        mask = ir.IntType(a.width)
+        mask = ir.IntType(LANE_WIDTH)
         bits = builder.bitcast(builder.fcmp_ordered(">", x, limit), mask)
         return builder.icmp_unsigned("!=", bits, ir.Constant(mask, 0))
 
     return elementwise(types.boolean, compute, a, b)
 
 
-def whole_of(width: int, value: int) -> Any:
-    return ir.Constant(ir.VectorType(INT64, width), [value] * width)
+def whole(value: int) -> Any:
+    return ir.Constant(WHOLE_NUMBERS, [value] * LANE_WIDTH)
 
 
 @intrinsic
@@ -347,8 +322,8 @@ def two_to_the(typing_context, k):
     """Return 2**k for lanes of whole numbers, -1022 <= k <= 1023."""
 
     def compute(builder, x):
-        exponent = builder.add(builder.fptosi(x, ir.VectorType(INT64, k.width)), whole_of(k.width, 1023))
-        return builder.bitcast(builder.shl(exponent, whole_of(k.width, 52)), x.type)
+        exponent = builder.add(builder.fptosi(x, WHOLE_NUMBERS), whole(1023))
+        return builder.bitcast(builder.shl(exponent, whole(52)), x.type)
 
     return elementwise(k, compute, k)
 
@@ -358,9 +333,9 @@ def mantissa_of(typing_context, x):
     """Return the mantissa m in [1, 2) of positive normal lanes, x = m 2**e."""
 
     def compute(builder, value):
-        bits = builder.bitcast(value, ir.VectorType(INT64, x.width))
-        kept = builder.and_(bits, whole_of(x.width, 0x000FFFFFFFFFFFFF))
-        return builder.bitcast(builder.or_(kept, whole_of(x.width, 0x3FF0000000000000)), value.type)
+        bits = builder.bitcast(value, WHOLE_NUMBERS)
+        kept = builder.and_(bits, whole(0x000FFFFFFFFFFFFF))
+        return builder.bitcast(builder.or_(kept, whole(0x3FF0000000000000)), value.type)
 
     return elementwise(x, compute, x)
 
@@ -370,7 +345,7 @@ def exponent_of(typing_context, x):
     """Return the binary exponent e of positive normal lanes, x = m 2**e with m in [1, 2)."""
 
     def compute(builder, value):
-        bits = builder.lshr(builder.bitcast(value, ir.VectorType(INT64, x.width)), whole_of(x.width, 52))
-        return builder.sitofp(builder.sub(bits, whole_of(x.width, 1023)), value.type)
+        bits = builder.lshr(builder.bitcast(value, WHOLE_NUMBERS), whole(52))
+        return builder.sitofp(builder.sub(bits, whole(1023)), value.type)
 
     return elementwise(x, compute, x)

@@ -15,6 +15,7 @@ import numpy as np
 from numba.extending import overload
 
 from armid.engine.simd import (
+    LANE_WIDTH,
     LINKED,
     RARE,
     Lanes,
@@ -27,7 +28,6 @@ from armid.engine.simd import (
     lane,
     mantissa_of,
     mixes_lanes,
-    n_lanes,
     nearest,
     negate,
     select,
@@ -100,7 +100,7 @@ def far_by_lane(function: Callable[[float], float]) -> Any:
 
     @rare
     def put(x, result):
-        for i in range(n_lanes(x)):
+        for i in range(LANE_WIDTH):
             if abs(lane(x, i)) > FAR_ANGLE:
                 result = with_lane(result, i, function(lane(x, i)))
         return result
@@ -174,7 +174,7 @@ def lanes_power(base, exponent):
 
 @rare
 def power_by_lane(a, b, result):
-    for i in range(n_lanes(result)):
+    for i in range(LANE_WIDTH):
         if not (lane(a, i) > SMALLEST_FLOAT and lane(result, i) == lane(result, i)):
             result = with_lane(result, i, math.pow(lane(a, i), lane(b, i)))
     return result
@@ -202,26 +202,6 @@ def define_binary(names: tuple[Any, ...], implementation: Callable[..., Any]) ->
         @overload(name, jit_options=LINKED)
         def act(a, b):
             return (lambda a, b: implementation(a, b)) if mixes_lanes(a, b) else None
-
-
-def define_extreme(name: Any, implementation: Callable[..., Any], passes_nan: bool) -> None:
-    """Give numba a minimum or maximum that passes on the NaN of either argument, or of neither.
-
-    `implementation(a, b)` returns a where one of them is NaN. Plain numbers come second: they are known to be finite.
-    """
-    LANE_FUNCTIONS.add(name)
-
-    @overload(name, jit_options=LINKED)
-    def act(a, b):
-        if not mixes_lanes(a, b):
-            return None
-        if not isinstance(a, Lanes):
-            return lambda a, b: implementation(b, a)
-        if not isinstance(b, Lanes):
-            return lambda a, b: implementation(a, b)
-        if passes_nan:
-            return lambda a, b: select(b != b, 0.5, b, implementation(a, b))
-        return lambda a, b: select(a != a, 0.5, b, implementation(a, b))
 
 
 smaller = compiled(lambda a, b: select(a, b, b, a))
@@ -278,10 +258,11 @@ define_unary((np.logical_not, operator.invert), compiled(lambda x: x == 0.0))
 define_binary((operator.pow, np.power, math.pow), lanes_power)
 define_binary((builtins.min,), smaller)
 define_binary((builtins.max,), larger)
-define_extreme(np.minimum, smaller, passes_nan=True)
-define_extreme(np.maximum, larger, passes_nan=True)
-define_extreme(np.fmin, smaller, passes_nan=False)
-define_extreme(np.fmax, larger, passes_nan=False)
+# `smaller` and `larger` return the first where one of the two is NaN; these pass on the NaN of either, or of neither.
+define_binary((np.minimum,), compiled(lambda a, b: select(b != b, 0.5, b, smaller(a, b))))
+define_binary((np.maximum,), compiled(lambda a, b: select(b != b, 0.5, b, larger(a, b))))
+define_binary((np.fmin,), compiled(lambda a, b: select(a != a, 0.5, b, smaller(a, b))))
+define_binary((np.fmax,), compiled(lambda a, b: select(a != a, 0.5, b, larger(a, b))))
 define_binary((np.logical_and, operator.and_), compiled(lambda a, b: select(a != 0.0, 0.5, b != 0.0, 0.0)))
 define_binary((np.logical_or, operator.or_), compiled(lambda a, b: select(a != 0.0, 0.5, 1.0, b != 0.0)))
 define_binary((np.copysign, math.copysign), with_sign)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from armid.engine.compile import UNCOMPILABLE, Kernel, compile_error, compile_model, compiling
+from armid.engine.simd import LANE_WIDTH
 from armid.errors import ArmidError, nearest
 from armid.model import Array, Manoeuvre, Model
 from armid.model.graph import LATE_LEAVES, Node
@@ -117,7 +118,6 @@ def simulate(
 
 def prepare(model: Model, manoeuvre: Manoeuvre, schedule: Schedule = Schedule(), states: bool = False) -> "Prepared":
     """Return what simulates populations through one manoeuvre as often as asked; arguments and errors as `simulate`."""
-    kernel, width = compile_model(model)
     spans = (replace(schedule, plan=None) if states else schedule).spans(manoeuvre.n_samples)
     # The plant says whether an input keeps the value of its last sample, else the record does.
     holds = [i.hold or manoeuvre.hold for i in model.plant.inputs] or [""]
@@ -131,7 +131,7 @@ def prepare(model: Model, manoeuvre: Manoeuvre, schedule: Schedule = Schedule(),
         np.zeros(len(model.states)) if schedule.rough is None else 1.0 / schedule.rough,
         manoeuvre.n_before,
     )  # fmt: skip
-    return Prepared(model, kernel, width, schedule, manoeuvre.n_samples, constants, settings, states)
+    return Prepared(model, compile_model(model), schedule, manoeuvre.n_samples, constants, settings, states)
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +144,6 @@ class Prepared:
 
     model: Model
     kernel: Kernel
-    width: int
     schedule: Schedule
     n_samples: int
     constants: Array
@@ -164,15 +163,15 @@ class Prepared:
         model = self.model
         candidates = as_population(model, population)
         n = len(candidates)
-        rows, places = arranged(candidates, self.width, self.schedule.weights)
+        rows, places = arranged(candidates, self.schedule.weights)
         # Constants of all candidates stand once for each lane.
-        lanes = np.where(places >= 0, places, n - 1) if constants is not None else np.zeros(self.width, dtype=np.int64)
+        lanes = np.where(places >= 0, places, n - 1) if constants is not None else np.zeros(LANE_WIDTH, dtype=np.int64)
         columns = np.ascontiguousarray(np.atleast_2d(self.constants if constants is None else constants)[lanes].T)
         outputs = np.empty((len(model.plant.outputs), n, self.n_samples))
         switches = np.full((len(model.latches), rows.shape[1]), np.nan)
         trace = np.empty((len(model.states), n, self.n_samples) if self.states else (0, 0, 0))
         given = (rows.ravel(), rows.shape[1], columns.ravel(), columns.shape[1], *self.settings, places)
-        n_groups = rows.shape[1] // self.width
+        n_groups = rows.shape[1] // LANE_WIDTH
         repeats = np.zeros(n_groups)
         with compiling(model, self.kernel):
             run(self.kernel, given, (outputs, switches.ravel(), trace, repeats), n_groups, threads)
@@ -206,13 +205,11 @@ def input_values(model: Model, manoeuvre: Manoeuvre) -> Array:
     return np.array(rows, dtype=np.float64)
 
 
-def arranged(
-    candidates: Array, width: int, weights: Array | None
-) -> tuple[Array, NDArray[np.int64]]:  # fmt: skip
+def arranged(candidates: Array, weights: Array | None) -> tuple[Array, NDArray[np.int64]]:
     """Return parameters as rows, one column for each lane, and the candidate of each lane (-1: padding)."""
-    n, padding = len(candidates), -len(candidates) % width
+    n, padding = len(candidates), -len(candidates) % LANE_WIDTH
     # within one group the order saves nothing
-    order = np.arange(n) if weights is None or n <= width else np.argsort(candidates @ weights, kind="stable")
+    order = np.arange(n) if weights is None or n <= LANE_WIDTH else np.argsort(candidates @ weights, kind="stable")
     lanes = np.append(order, np.repeat(order[-1:], padding))
     return np.ascontiguousarray(candidates[lanes].T), np.append(order, np.full(padding, -1))
 

@@ -54,6 +54,8 @@ class Node:
 @dataclass
 class Graph:
     nodes: dict[str, Node] = field(default_factory=dict)
+    # what was asked for -> its order, of a graph that is complete
+    orders: dict[tuple[str, ...], list[Node]] = field(default_factory=dict)
 
     def add(self, node: Node) -> None:
         self.nodes[node.key] = node
@@ -81,8 +83,10 @@ class Graph:
 
     def values(self, wanted: Iterable[str], known: Mapping[str, Any]) -> dict[str, Any]:
         """Return key -> value of what is known and of all that leads to the wanted nodes, by their plain functions."""
-        values = dict(known)
-        for node in self.order(wanted):
+        values, keys = dict(known), tuple(wanted)
+        if keys not in self.orders:
+            self.orders[keys] = self.order(keys)
+        for node in self.orders[keys]:
             values[node.key] = node.value(values)
         return values
 

@@ -14,8 +14,8 @@ from armid.errors import ArmidError, nearest, quoted
 from armid.model import Array, Manoeuvre, ManoeuvreKey, Plant
 from armid.record.record import Piece, Record, RecordWarning, Signal
 from armid.record.resample import (
-    FEWEST_SAMPLES,
     Timing,
+    check_number,
     gap_samples,
     is_constant,
     moved_onto_grid,
@@ -67,6 +67,7 @@ BRIDGED = 2
 MOST_EMPTY = 0.5
 BROKEN_WORDS = {"clipped": "are at the limit of the sensor", "stuck": "are repeated while the signal leaps",
          "spikes": "are far from their neighbours"}  # fmt: skip
+DATA_IN_MOTION = "that are data in the motion"
 # Share of a turn that an angle which wraps spans at least.
 SPANNED = 0.75
 # End of the header of an angle -> values at which it wraps to 0.
@@ -134,7 +135,7 @@ def signal_of(
     rows[present] = renewed(values[present], sensor.hold)
     if sensor.hold > 1:
         warn(table, f"{header} is renewed every {sensor.hold} rows: one sample of each renewal counts")
-    check_number(table, header, rows, timing)
+    check_number(int(rows[timing.first :].sum()), f"{table.file}: {header} has", DATA_IN_MOTION)
     n_new = int(rows.sum())
     jumps = np.cumsum(np.any([after_sudden(x) for x in inputs], axis=0)) if inputs else np.zeros(values.size)
     new = New(values, rows, times, timing)
@@ -149,7 +150,7 @@ def signal_of(
     rows[np.concatenate([*broken.values()])] = False
     faults = [lost(table, header, kind, at, times) for kind, at in broken.items() if at.size]
     check_lost(table, header, faults, n_new, most_lost)
-    check_number(table, header, rows, timing)
+    check_number(int(rows[timing.first :].sum()), f"{table.file}: {header} has", DATA_IN_MOTION)
     measured, data = moved_onto_grid(values, times, timing, rows)
     if output and is_constant(values[timing.first :][rows[timing.first :]]):
         what = "speed" if is_speed else output
@@ -167,10 +168,8 @@ class New:
         self.n_rest = int(np.searchsorted(self.at, timing.first))
         self.rest, self.motion = self.values[: self.n_rest], self.values[self.n_rest :]
         apart = np.diff(self.at[self.n_rest :])
-        even = timing.irregularity is None and apart.size > 0 and apart.min() == apart.max()
+        even = not timing.irregularity and apart.size > 0 and apart.min() == apart.max()
         self.uneven = None if even else self.times[self.n_rest :]
-        before = self.times[: self.n_rest]
-        self.interval = float(np.median(np.diff(before))) if before.size > 1 else timing.interval
 
     def since(self, counted: Array) -> Mask:
         """Return whether a count over all rows has grown since the row of data before, (n,)."""
@@ -179,7 +178,7 @@ class New:
 
 def rest_and_noise(new: New, inputs: Sequence[Array], is_speed: bool) -> tuple[Array, Noise]:
     """Return the samples at rest, before the motion or between motions, and the noise that they or the motion tell."""
-    noise = noise_of(new.rest, new.motion, new.interval, new.uneven)
+    noise = noise_of(new.rest, new.motion, new.uneven)
     if new.rest.size >= FEWEST_REST_SAMPLES or not inputs:
         return new.rest, noise
     changes = sum((np.append(0, np.cumsum(np.diff(x) != 0.0)) for x in inputs), np.zeros(inputs[0].size))
@@ -189,7 +188,7 @@ def rest_and_noise(new: New, inputs: Sequence[Array], is_speed: bool) -> tuple[A
     # equal values tell the step of the sensor alone, which the motion tells as well
     if not rest.size or np.ptp(rest) == 0.0:
         return new.rest, noise
-    noise = noise_of(rest, new.motion, new.interval, new.uneven)
+    noise = noise_of(rest, new.motion, new.uneven)
     return (rest - np.mean(rest), noise) if noise.source == "rest" else (new.rest, noise)
 
 
@@ -205,13 +204,6 @@ def check_empty(table: CsvTable, header: str, present: Mask) -> None:
         if empty.size > MOST_EMPTY * present.size:
             raise ArmidError(f"{table.file}: {fault}, at most half of the rows without one are expected")
         warn(table, f"{fault}: these are no data")
-
-
-def check_number(table: CsvTable, header: str, rows: Mask, timing: Timing) -> None:
-    n = int(rows[timing.first :].sum())
-    if n < FEWEST_SAMPLES:
-        raise ArmidError(f"{table.file}: {header} has {n} samples that are data in the motion, at least "
-                         f"{FEWEST_SAMPLES} are expected")  # fmt: skip
 
 
 def lost(table: CsvTable, header: str, kind: str, at: NDArray[np.intp], times: Array) -> Broken:

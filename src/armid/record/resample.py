@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from armid.errors import ArmidError
 from armid.model import Array
-from armid.record.record import Irregularity, Record, RecordWarning
+from armid.record.record import Record, RecordWarning
 from armid.record.sensor import Mask
 
 FEWEST_SAMPLES = 20
@@ -32,7 +32,8 @@ class Timing:
     """How the samples of a file come onto an even grid.
 
     first: row of the first sample at or after the start. earliest: first sample of the grid that was measured and is
-    not before t = 0. resampled: False when the rows from `first` on are the samples of the grid.
+    not before t = 0. resampled: False when the rows from `first` on are the samples of the grid. irregularity: of the
+    times, in words, "" for even ones.
     """
 
     start: float
@@ -41,7 +42,7 @@ class Timing:
     first: int
     earliest: int
     resampled: bool
-    irregularity: Irregularity | None
+    irregularity: str
 
     def grid(self) -> Array:
         return self.start + self.interval * np.arange(self.n_samples, dtype=np.float64)
@@ -58,8 +59,8 @@ def timing_of(times: Array, from_rest: bool, file: str) -> Timing:
         # a thousandth of an interval before t = 0 counts as 0
         slack = EVEN_TIMES * float(np.median(np.diff(times))) if times.size > 1 else 0.0
         first = int(np.searchsorted(times, -slack))
-    motion = times[first:]
-    check_number(motion.size, from_rest, file)
+    motion, place = times[first:], "after t = 0" if from_rest else "in the record"
+    check_number(motion.size, f"{file}:", place)
     interval, tolerance, even = fitted_grid(motion, file)
     begin, start = float(motion[0]), 0.0 if from_rest else float(motion[0])
     if begin - start > LATEST_START * interval:
@@ -67,23 +68,20 @@ def timing_of(times: Array, from_rest: bool, file: str) -> Timing:
                          "at or before 0 is expected")  # fmt: skip
     resampled = not even or abs(begin - start) > tolerance
     n_samples = grid_size(motion, start, interval, file) if resampled else motion.size
-    check_number(n_samples, from_rest, file)
+    check_number(n_samples, f"{file}:", place)
     # a plant from rest may have lost its sample at t = 0; an axis may begin before 0, and what is before 0 never counts
     earliest = 0 if from_rest and first > 0 else int(np.ceil((max(begin, 0.0) - start) / interval - EVEN_TIMES))
-    irregularity = None if even else irregularity_of(motion)
-    if irregularity is not None:
-        share, widest = irregularity.share, irregularity.largest_gap
-        said = (f"{file}: irregular sampling: {share:.2%} of {motion.size - 1} intervals are off by more than 1 %, the "
-                f"largest is {widest:.3g} times the median, at t = {irregularity.at_s:.6g} s")  # fmt: skip
-        said += ", a large gap that is bridged by a straight line" if widest > LARGE_GAP else ""
-        warnings.warn(f"{said}; resampled evenly at {interval:.6g} s", IrregularSamplingWarning, stacklevel=2)
+    irregularity = "" if even else irregularity_of(motion)
+    if irregularity:
+        said = f"{file}: irregular sampling: {irregularity}; resampled evenly at {interval:.6g} s"
+        warnings.warn(said, IrregularSamplingWarning, stacklevel=2)
     return Timing(start, interval, n_samples, first, max(earliest, 0), resampled, irregularity)
 
 
-def check_number(n_samples: int, from_rest: bool, file: str) -> None:
+def check_number(n_samples: int, where: str, which: str) -> None:
+    """Refuse fewer than 20 samples; where, which: the words around their number."""
     if n_samples < FEWEST_SAMPLES:
-        place = "after t = 0" if from_rest else "in the record"
-        raise ArmidError(f"{file}: {n_samples} samples {place}, at least {FEWEST_SAMPLES} are expected")
+        raise ArmidError(f"{where} {n_samples} samples {which}, at least {FEWEST_SAMPLES} are expected")
 
 
 def fitted_grid(times: Array, file: str) -> tuple[float, float, bool]:
@@ -119,14 +117,17 @@ def printed_resolution(times: Array, interval: float) -> float:
     return 0.0
 
 
-def irregularity_of(times: Array) -> Irregularity | None:
+def irregularity_of(times: Array) -> str:
+    """Return how irregular times are, in words, "" where their rounding explains it."""
     intervals = np.diff(times)
     median = float(np.median(intervals))
     relative = intervals / median
     if np.max(np.abs(relative - 1)) <= EVEN_TIMES + 1.01 * printed_resolution(times, median) / median:
-        return None
-    widest = int(np.argmax(relative))
-    return Irregularity(float(np.mean(np.abs(relative - 1) > 0.01)), float(relative[widest]), float(times[widest]))
+        return ""
+    widest, share = int(np.argmax(relative)), np.mean(np.abs(relative - 1) > 0.01)
+    bridged = ", a large gap that is bridged by a straight line" if relative[widest] > LARGE_GAP else ""
+    return (f"{share:.2%} of {intervals.size} intervals are off by more than 1 %, the largest is "
+            f"{relative[widest]:.3g} times the median, at t = {times[widest]:.6g} s{bridged}")  # fmt: skip
 
 
 def grid_size(times: Array, start: float, interval: float, file: str) -> int:
@@ -199,15 +200,12 @@ def around(times: Array, grid: Array) -> tuple[NDArray[np.intp], NDArray[np.intp
 
 def parabola_slopes(values: Array, times: Array, rows: NDArray[np.int64]) -> Array:
     """Return the slope at each row of the least-squares parabola through 7 neighbours, at the ends on one side."""
-    first, n = np.clip(rows - NEIGHBOURS // 2, 0, times.size - NEIGHBOURS), NEIGHBOURS
-    unit = float(np.median(np.diff(times)))
-    middle = sum((times[first + i] for i in range(n)), np.zeros(rows.size)) / n
-    places = [(times[first + i] - middle) / unit for i in range(n)]
-    second, third, fourth = (sum((t**k for t in places), np.zeros(rows.size)) for k in (2, 3, 4))
-    straight, curved = np.zeros(rows.size), np.zeros(rows.size)
-    for i, t in enumerate(places):
-        straight += t * values[first + i]
-        curved += (t**2 - second / n) * values[first + i]
+    n, unit = NEIGHBOURS, float(np.median(np.diff(times)))
+    near = np.clip(rows - n // 2, 0, times.size - n) + np.arange(n)[:, np.newaxis]
+    middle = np.sum(times[near], axis=0) / n
+    t, x = (times[near] - middle) / unit, values[near]
+    second, third, fourth = (np.sum(t**k, axis=0) for k in (2, 3, 4))
+    straight, curved = np.sum(t * x, axis=0), np.sum((t**2 - second / n) * x, axis=0)
     bend = fourth - second**2 / n
     share = second * bend - third**2
     own = (times[rows] - middle) / unit
@@ -262,9 +260,7 @@ def window_samples(record: Record, window_s: Sequence[float] | None, where: str)
         ends = np.clip((np.array([begin, end]) - grid.start_time) / grid.interval, -1.0, n_samples)
         low = max(int(np.ceil(ends[0] - SLACK)), low)
         high = min(int(np.floor(ends[1] + SLACK)) + 1, high)
-    if high - low < FEWEST_SAMPLES:
-        raise ArmidError(f"{where}: the window holds {max(high - low, 0)} samples of {record.file}, at least "
-                         f"{FEWEST_SAMPLES} are expected")  # fmt: skip
+    check_number(max(high - low, 0), f"{where}: the window holds", f"of {record.file}")
     return low, high
 
 

@@ -66,17 +66,6 @@ def number(value: object) -> float:
     raise KindError(value)
 
 
-def instance_of(python: type, schema: str) -> ValueKind:
-    """Return the kind of all values of a type of Python; schema: its name in JSON Schema."""
-
-    def read(value: object) -> Any:
-        if isinstance(value, python):
-            return value
-        raise KindError(value)
-
-    return ValueKind(read, {"type": schema})
-
-
 def tested(kind: ValueKind, test: Callable[[Any], bool], **schema: Any) -> ValueKind:
     """Return a kind of fewer values; schema: how JSON Schema says the test, nothing where it cannot."""
 
@@ -87,6 +76,11 @@ def tested(kind: ValueKind, test: Callable[[Any], bool], **schema: Any) -> Value
         raise KindError(value)
 
     return ValueKind(both, {**kind.schema, **schema})
+
+
+def instance_of(python: type, schema: str) -> ValueKind:
+    """Return the kind of all values of a type of Python; schema: its name in JSON Schema."""
+    return tested(ValueKind(lambda value: value, {}), lambda value: isinstance(value, python), type=schema)
 
 
 any_text, boolean = instance_of(str, "string"), instance_of(bool, "boolean")

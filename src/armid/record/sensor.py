@@ -7,7 +7,7 @@ two rows makes values that no sensor gave.
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import ceil, comb, log1p
+from math import ceil, comb
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,14 +38,13 @@ class Noise:
     """What is known of a sensor's noise.
 
     rms: [unit of the output], about the mean. mean: not subtracted anywhere; None where no rest was recorded.
-    correlation_time_s: of the exponential correlation with the same sum; 0 for white noise. effective_fraction:
-    independent samples per sample, 1/(1 + 2 sum rho_k), in (0, 1]. source: "rest" (the arm under its brake) or
-    "differences" (high differences of the motion, which cannot tell a correlation: the noise is taken for white).
+    effective_fraction: independent samples per sample, 1/(1 + 2 sum rho_k), in (0, 1], 1 for white noise. source:
+    "rest" (the arm under its brake) or "differences" (high differences of the motion, which cannot tell a correlation:
+    the noise is taken for white).
     """
 
     rms: float
     mean: float | None
-    correlation_time_s: float
     effective_fraction: float
     n_samples: int
     source: str
@@ -168,7 +167,7 @@ FEWEST_INDEPENDENT = 12.0
 OUTLYING = 4.0
 
 
-def noise_of(rest: Array, motion: Array, interval: float, times: Array | None = None) -> Noise:
+def noise_of(rest: Array, motion: Array, times: Array | None = None) -> Noise:
     """Return the noise of a record.
 
     rest: samples at rest; with fewer than 50 of them, or where the sensor's step hides their noise, the differences of
@@ -184,15 +183,13 @@ def noise_of(rest: Array, motion: Array, interval: float, times: Array | None = 
         # Of a slow motion the steps alone look like up to twice their noise; what a step hides is less than a step.
         if is_short or not is_equal or (agrees and apart > 2.0 * floor):
             most = np.inf if is_equal else max(step, floor)
-            return Noise(float(np.clip(apart, floor, most)), None, 0.0, 1.0, motion.size, "differences")
+            return Noise(float(np.clip(apart, floor, most)), None, 1.0, motion.size, "differences")
     mean = float(np.mean(rest))
     # of equal values the mean can miss the value by its last digit, which would look like correlated noise
     deviations = rest - mean if np.ptp(rest) > 0 else np.zeros_like(rest)
     rms = float(np.sqrt(np.mean(deviations**2)))
     total = correlation_sum(deviations)
-    # an exponential correlation rho_k = phi^k sums to phi/(1 - phi) = total, and phi = exp(-interval/time constant)
-    time_constant = interval / log1p(1 / total) if total > 0 else 0.0
-    return Noise(max(rms, floor), mean, time_constant, 1 / (1 + 2 * total), rest.size, "rest")
+    return Noise(max(rms, floor), mean, 1 / (1 + 2 * total), rest.size, "rest")
 
 
 @dataclass(frozen=True)
@@ -407,11 +404,9 @@ def divided_differences(values: Array, times: Array, order: int) -> Array:
     """
     n, unit = values.size - order, float(np.median(np.diff(times)))
     total, squares = np.zeros(n), np.zeros(n)
+    windows = np.lib.stride_tricks.sliding_window_view(times, order + 1).T
     for j in range(order + 1):
-        weight = np.ones(n)
-        for i in range(order + 1):
-            if i != j:
-                weight *= unit / (times[j : j + n] - times[i : i + n])
+        weight = np.prod(unit / np.delete(windows[j] - windows, j, axis=0), axis=0)
         total += weight * values[j : j + n]
         squares += weight**2
     return total / np.sqrt(squares)

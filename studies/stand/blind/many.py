@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from stand import RefusalError
-from stand.campaign import check_place, replacing
+from stand.campaign import check_place, replacing, write_files
 from stand.command import Parser, carry_out
 
 Entry = dict[str, Any]
@@ -44,9 +44,7 @@ def _write_campaign(fresh: Path, make: Make, named: tuple[str, Any]) -> Entry:
     """Make one campaign, write its files, and give its entry in the key."""
     name, case = named
     files, entry = make(case)
-    (fresh / name).mkdir()
-    for file, text in files.items():
-        (fresh / name / file).write_bytes(text.encode())
+    write_files(fresh / name, files)
     return entry
 
 

@@ -30,16 +30,6 @@ def coupling_torque(twist, twist_speed, stiffness, link_damping, series_complian
     return spring + (link_damping * twist_speed + coupling) * touching
 
 
-def to_upper_contact(twist, play_half):
-    """Way to the contact on the one side [rad]."""
-    return twist - play_half
-
-
-def to_lower_contact(twist, play_half):
-    """Way to the contact on the other side [rad]."""
-    return twist + play_half
-
-
 def hub_acceleration(drive_effort, drive, hub_damping, hub_speed, coupling_torque, torque, hub_inertia):
     """Acceleration of the hub [rad/s2]."""
     return (drive_effort + drive - hub_damping * hub_speed + coupling_torque + torque) / hub_inertia
@@ -69,7 +59,9 @@ def twist_speed_rate(coupling_torque, tip_inertia, hub_acceleration):
     return -coupling_torque / tip_inertia - hub_acceleration
 
 
-CONTACTS = (Guard("upper_contact", to_upper_contact), Guard("lower_contact", to_lower_contact))
+# The way to the contact on either side [rad].
+CONTACTS = (Guard("upper_contact", lambda twist, play_half: twist - play_half),
+            Guard("lower_contact", lambda twist, play_half: twist + play_half))  # fmt: skip
 FROM_RECORD = "set from the record"
 
 flexible_link = Plant(
