@@ -194,6 +194,7 @@ def test_one_effect_under_two_names_is_looked_for_once():
     filters = [f for f in EFFECTS["controller_delay"].every_form if f not in EFFECTS["controller_delay"].searched_forms]
     assert [f.form for f in filters] == ["feedback_filter", "command_filter", "voltage_filter"]
     assert [f.exact.form for f in filters] == ["feedback", "command", "voltage"]
+    assert [e.form for e in (Model(PLANTS["shell_transfer_arm"]) + filters[0]).exact.effects] == ["feedback"]
 
 
 def test_the_voltage_of_a_plug_in_is_late_exactly_and_its_derivative_by_the_delay():

@@ -94,8 +94,8 @@ class Effect:
     unless: a port; a plant that offers it refuses this form, as another acts there.
     delays: late signals, names that the equations of the effect may use.
     exact: the effect that this one approximates, None where it is exact. Both have the same parameters. The difference
-    of their signals is the error of the approximation. A search tries a form that approximates only where it was chosen
-    by its word.
+    of their signals is the error of the approximation, see `Model.exact`. A search tries a form that approximates only
+    where it was chosen by its word.
 
     Raises ModelError when it adds nothing, names something twice, or has a form of another name or without a word.
     """

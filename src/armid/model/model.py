@@ -74,6 +74,16 @@ class Model:
         return list(dict.fromkeys(f"{e.name}.{d.by}" for e in self.effects for d in e.delays))
 
     @cached_property
+    def exact(self) -> "Model":
+        """The model with each effect that approximates another (`Effect.exact`) replaced by that one.
+
+        Both have the same parameters: the difference of their signals at one candidate is the error of the
+        approximation [unit of the output], and what explains no more than that explains nothing.
+        """
+        exact = (e if e.exact is None else replace(e.exact, name=e.name) for e in self.effects)
+        return replace(self, effects=tuple(exact))
+
+    @cached_property
     def latches(self) -> list[str]:
         """Qualified names of the one-way switches."""
         own = [g.name for g in self.plant.guards if g.latch]
