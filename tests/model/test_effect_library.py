@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armid.errors import ArmidError
-from armid.model import EFFECTS, PLANTS, Effect, Model, Parameter, applicable, refusal_of
+from armid.model import EFFECTS, PLANTS, Effect, Model, Output, Parameter, applicable, refusal_of
 from armid.model.effects import control, drive, friction, sensor
 from armid.model.plants import flexible_link
 from armid.model.plants.driven_axis import driven_axis, rotary_axis
@@ -67,6 +67,16 @@ def test_a_plant_refuses_with_the_name_that_it_lacks_and_an_effect_comes_in_the_
     first = replace(wheel, forms=(shaft,))
     assert applicable({"twofold": first}, ARM) == {"twofold": shaft}
     assert applicable({"wheel": wheel}, ARM) == {}
+
+
+def test_where_another_quantity_than_omega_is_recorded_its_sensor_alone_has_effects():
+    belt = replace(rotary_axis, ports={**rotary_axis.ports, "output": "m/s"}, output="", output_unit="",
+                   quantities={**rotary_axis.quantities, "belt": lambda omega, output: 0.1 * omega + output},
+                   outputs=(Output("belt_speed", "belt", "m/s", port="output"),))  # fmt: skip
+    known = applicable({**sensor.sensor_effects(belt), **EFFECTS}, belt)
+    assert {name for name, effect in known.items() if "output" in effect.adds} == {
+        "belt_speed_bias", "belt_speed_scale", "belt_speed_delay", "belt_speed_lag",
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize("effect", EVERY_FORM)

@@ -73,8 +73,13 @@ def bias_error(bias):
     return bias
 
 
+def constant_error(omega, bias):
+    """Speed that is recorded less the true one, constant; it has a place only where `omega` is what is recorded."""
+    return bias
+
+
 gyro_bias = Effect(
-    name="gyro_bias", adds={"output": bias_error},
+    name="gyro_bias", adds={"output": constant_error},
     parameters=(Parameter("bias", "speed", -0.05, 0.05, null=0.0, note="0.3 deg/s are 0.0052 rad/s"),),
     note="constant error of the recorded speed", source="doi:10.1049/PBRA017E",
 )  # fmt: skip
