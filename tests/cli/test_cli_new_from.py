@@ -166,6 +166,7 @@ def test_the_plant_of_a_plug_in_is_the_one_of_the_campaign(run, refused):
     assert made.out == f"wrote mine; try: armid check mine --plugin {plugin}\n"
     toml = tomllib.loads(Path("mine/campaign.toml").read_text())
     assert (toml["plant"], toml["inputs"]) == ("winch", {"volts": "volts_V"})
+    assert "hold" not in toml, "the plant says what its input does between two rows"
     assert run("check", "mine", "--plugin", plugin).code == 0
     assert "a campaign that is made by --from is expected" in refused("new", "effect", "x", "--plugin", plugin)
 
@@ -189,7 +190,8 @@ def test_a_position_of_a_linear_axis_is_what_the_plant_of_a_plug_in_reads(run, r
     Path("slide.py").write_text(SLIDE)
     assert "no plant for" in refused("new", "campaign", "none", "--from", "a.csv")
     assert run("new", "campaign", "mine", "--from", "a.csv", "--plugin", "slide.py:slide").code == 0
-    assert tomllib.loads(Path("mine/campaign.toml").read_text())["inputs"] == {"volts": "volts_V"}
+    toml = tomllib.loads(Path("mine/campaign.toml").read_text())
+    assert (toml["inputs"], toml["hold"]) == ({"volts": "volts_V"}, "zero")
     assert Path("mine/a.csv").read_text().startswith("time_s,slide_mm,volts_V")
     assert run("check", "mine", "--plugin", "slide.py:slide").code == 0
     write(Path("b.csv"), "t_s,motor_V,turn_deg", times, drive, angle)

@@ -5,7 +5,7 @@ import os.path
 import re
 import sys
 import sysconfig
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from importlib.util import find_spec
@@ -297,7 +297,11 @@ def guessed_campaign(
     notes += [f"not used: {', '.join(map(quoted, unused))}"] if unused else []
     if any(column_of(h).end in COUNT_ENDS for h in unused):
         notes.append("counts of an encoder are an angle as angle_counts, with counts_per_turn in this file")
-    return guessed_text(name, tables, written, renamed, [*drives], notes, model, named), written
+    # what the plant says of an input counts, whatever the file says
+    known = {i.name for i in plant.inputs if i.hold} if plant is not None else set[str]()
+    open_drives = [headers[i] for i in inputs if i not in known]
+    hold = [guessed_hold(written.values(), open_drives)] if open_drives else []
+    return guessed_text(name, tables, written, renamed, [*drives], notes, [*model, *hold], named), written
 
 
 def moves_straight(roles: Mapping[str, FileColumn], table: CsvTable) -> bool:
@@ -448,15 +452,10 @@ def guessed_text(
     name: str, tables: Sequence[CsvTable], written: Mapping[str, Mapping[str, Array]], renamed: Mapping[str, str],
     drives: Sequence[str], notes: Sequence[str], model: Sequence[str], named: Sequence[str],
 ) -> str:  # fmt: skip
-    # One device drives all records: steps show that it holds, a chirp cannot.
-    held = [any(np.mean(np.diff(columns[drive]) == 0.0) > KEPT for drive in drives) for columns in written.values()]
-    steps = f"is constant between two rows, as its steps in {held.count(True)} of the {len(held)} files show"
-    kept = ("zero", steps) if any(held) else ("linear", "runs straight between two rows, as it changes in each row")
     lines = [
         "# Written by `armid new campaign --from`: check each line with GUESS. The CSV files are copies with",
         "# headers that armid reads. Numbers are those of the originals unless a line says so, times are in",
         "# seconds.", "#", *(f"# {note}" for note in notes), f'name = "{name}"', *model,
-        f'hold = "{kept[0]}"  # GUESS: the drive {kept[1]}',
     ]  # fmt: skip
     wrapped = [new for old, new in renamed.items() for t in tables if wraps_at(t.columns[old], new)]
     lines += [f"unwrap = true  # {wrapped[0]} jumps by whole turns"] if wrapped else []
@@ -467,6 +466,15 @@ def guessed_text(
         lines += ["", "[[records]]", f'file = "{file}"  # {about(columns, measured)}']
         lines += [f'role = "{"holdout" if last else "train"}"' + ("  # GUESS: the last file judges" if last else "")]
     return "\n".join(lines) + "\n"
+
+
+def guessed_hold(written: Iterable[Mapping[str, Array]], drives: Sequence[str]) -> str:
+    """Return the line that says what inputs do between two rows."""
+    # One device drives all records: steps show that it holds, a chirp cannot.
+    held = [any(np.mean(np.diff(columns[drive]) == 0.0) > KEPT for drive in drives) for columns in written]
+    steps = f"is constant between two rows, as its steps in {held.count(True)} of the {len(held)} files show"
+    kept = ("zero", steps) if any(held) else ("linear", "runs straight between two rows, as it changes in each row")
+    return f'hold = "{kept[0]}"  # GUESS: the drive {kept[1]}'
 
 
 def about(columns: Mapping[str, Array], measured: str) -> str:
