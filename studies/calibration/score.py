@@ -42,10 +42,9 @@ def main(words: Sequence[str]) -> int:
 
 def read(folder: Path) -> tuple[dict[str, Any], list[Closed], list[str]]:
     """Return the plan of a study, its closed campaigns as far as there are any, and names of those that failed."""
-    head = folder / "plan.json"
-    if not head.is_file():
-        sys.exit(f"{head} is not there: a folder of studies/calibration/run.py is expected")
-    plan, every, failed = json.loads(head.read_text()), [], []
+    if not (folder / "plan.json").is_file():
+        sys.exit(f"{folder / 'plan.json'} is not there: a folder of studies/calibration/run.py is expected")
+    plan, every, failed = json.loads((folder / "plan.json").read_text()), [], []
     for task in tasks(plan["size"]):
         if file_of(folder, task).exists():
             answer = json.loads(file_of(folder, task).read_text())

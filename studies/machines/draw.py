@@ -179,13 +179,10 @@ def attempt(plan: Plan, rng: np.random.Generator) -> Drawn | None:
             return Drawn(plan, numbers, off, tuple(planted), tuple(map(float, moves)), times, kinds, tuple(roles),
                          inputs, outputs, sensors, fault)  # fmt: skip
         rng.bit_generator.state = state
-        planted = [stronger(p) if m <= MOVES else p for p, m in zip(planted, moves, strict=True)]
+        # twice as strong: a dead time is still a whole number of steps
+        doubled = [replace(p, sizes={**p.sizes, p.form.strength: 2.0 * p.sizes[p.form.strength]}) for p in planted]
+        planted = [d if m <= MOVES else p for d, p, m in zip(doubled, planted, moves, strict=True)]
     return None
-
-
-def stronger(planted: Planted) -> Planted:
-    """Return an effect of twice the strength, a dead time still a whole number of steps."""
-    return replace(planted, sizes={**planted.sizes, planted.form.strength: 2.0 * planted.sizes[planted.form.strength]})
 
 
 def compared(
