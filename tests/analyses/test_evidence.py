@@ -21,28 +21,26 @@ from armid.study.analyses.convergence import SUCCESS_TOLERANCES
 
 def test_labels_and_settings_tell_what_differs():
     one, two = made(seeds=1), made(seeds=1, fitness=("rmse", "similarity"))
-    assert set(outcomes(one.runs, one.parameters, one.unit)["variant"]) == {"pso", "cmaes", "de+bobyqa"}
-    assert "pso on rmse" in set(outcomes(two.runs, two.parameters, two.unit)["variant"])
+    assert set(outcomes(one.runs, one.parameters, "rad/s")["variant"]) == {"pso", "cmaes", "de+bobyqa"}
+    assert "pso on rmse" in set(outcomes(two.runs, two.parameters, "rad/s")["variant"])
     one, two = made(seeds=1), made(seeds=1, windows=("0-0.7 s", "whole"))
-    assert set(outcomes(one.runs, one.parameters, one.unit)["setting"]) == {"noise-free", "0.3 deg/s"}
-    assert "0.3 deg/s, whole" in set(outcomes(two.runs, two.parameters, two.unit)["setting"])
-    own = outcomes(one.runs.assign(noise_deg_s=np.nan), one.parameters, one.unit)
+    assert set(outcomes(one.runs, one.parameters, "rad/s")["setting"]) == {"noise-free", "0.3 deg/s"}
+    assert "0.3 deg/s, whole" in set(outcomes(two.runs, two.parameters, "rad/s")["setting"])
+    own = outcomes(one.runs.assign(noise_deg_s=np.nan), one.parameters, "rad/s")
     assert set(own["setting"]) == {"as recorded"}
 
 
 def test_largest_error_is_of_known_truths_and_infinite_for_a_failed_run():
     results = made(seeds=1, failed=2)
-    runs = outcomes(results.runs, results.parameters, results.unit)
+    runs = outcomes(results.runs, results.parameters, "rad/s")
     assert np.isinf(runs["largest_error"].iloc[-2:]).all()
     by_run = results.parameters.set_index(["run", "parameter"])["relative_error"].unstack()
     done = runs["run"].iloc[:-2]
     assert runs["largest_error"].iloc[:-2].tolist() == by_run.max(axis=1).loc[done].tolist()
     rows = results.parameters.copy()
     rows.loc[rows["parameter"] != "k", ["truth", "relative_error"]] = np.nan
-    assert (
-        outcomes(results.runs, rows, results.unit)["largest_error"].iloc[:-2].tolist() == by_run["k"].loc[done].tolist()
-    )
-    unknown = outcomes(results.runs, rows.assign(relative_error=np.nan), results.unit)["largest_error"]
+    assert outcomes(results.runs, rows, "rad/s")["largest_error"].iloc[:-2].tolist() == by_run["k"].loc[done].tolist()
+    unknown = outcomes(results.runs, rows.assign(relative_error=np.nan), "rad/s")["largest_error"]
     assert unknown.iloc[:-2].isna().all()
 
 
@@ -96,7 +94,7 @@ def test_the_tolerances_of_the_success_rates_are_targets_and_a_share_is_that_of_
 
 def test_hits_and_held_values_of_each_run_of_the_best_and_without_those_that_came_in_later():
     results = made(seeds=2, failed=1)
-    runs = outcomes(results.runs, results.parameters, results.unit)
+    runs = outcomes(results.runs, results.parameters, "rad/s")
     truths = {case["name"]: case["truth"] for case in results.study["cases"]}
     found = histories(results, runs, truths, {})
     assert np.isinf(found.error_hits[-1]).all()

@@ -16,7 +16,7 @@ import numpy as np
 from pandas import DataFrame
 
 from armid.report.document import slug, unlike
-from armid.study.analyses.analysis import outcomes
+from armid.study.analyses.analysis import outcomes, unit_of
 from armid.study.results import StudyResults
 from armid.study.store import RunTrace
 
@@ -29,7 +29,7 @@ LARGEST_INSTANCE = 65_535
 
 def export_ioh(results: StudyResults, path_of: Callable[[str], Path]) -> int:
     """Write one .json and one .dat for each algorithm and function; return how many runs they hold."""
-    runs = outcomes(results.runs, results.parameters, results.unit)
+    runs = outcomes(results.runs, results.parameters, unit_of(results.study))
     runs["function"] = runs["case"] + ", " + runs["setting"] + ", " + runs["fitness"]
     ids = {name: i for i, name in enumerate(dict.fromkeys(runs["function"]), 1)}
     variants = list(dict.fromkeys(runs["variant"]))

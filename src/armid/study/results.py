@@ -34,7 +34,6 @@ FROM plan p JOIN runs r USING (run) JOIN loops l USING (run) ORDER BY p.place
 TRACES = "SELECT t.run, t.names, t.trace FROM plan p JOIN traces t USING (run)"
 NUMERIC_COLUMNS = ("noise_deg_s", "value", "train_rmse", "train_s", "train_s1", "train_s2", "holdout_rmse", "seconds")
 COUNTED = ("used", "n_failed")
-SPEED_UNIT = "rad/s"
 NO_TRACE = RunTrace("", np.empty(0, np.int64), np.empty(0), np.empty((0, 0)), ())
 
 
@@ -59,11 +58,6 @@ class StudyResults(Shown):
     study: dict[str, Any]
     runs: pd.DataFrame
     parameters: pd.DataFrame
-
-    @property
-    def unit(self) -> str:
-        """Unit of the records, SI; older studies do not tell it."""
-        return str(self.study.get("unit", SPEED_UNIT))
 
     def document(self) -> "Document":
         """Return the answer and the main table; no trace is read."""

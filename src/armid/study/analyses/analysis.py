@@ -12,7 +12,7 @@ from pandas import DataFrame, Series
 from armid.model import Array
 from armid.problem.fitness import FITNESS
 from armid.report.document import Column, Part, Table
-from armid.study.results import SPEED_UNIT, StudyResults
+from armid.study.results import StudyResults
 from armid.study.spec import NOISES
 from armid.study.store import ON, RunTrace
 from armid.units import scale_of
@@ -114,7 +114,7 @@ def trace_errors(trace: RunTrace, truth: Mapping[str, float]) -> Array:
     return np.asarray(np.max(np.abs(trace.X[:, known] - true[known]) / np.abs(true[known]), axis=1))
 
 
-WITHOUT_NOISE = "noise-free"
+WITHOUT_NOISE, SPEED_UNIT = "noise-free", "rad/s"
 PAPER = "the paper's pso"
 # Variants that a table of every row and parameter is printed for, with the paper's own method.
 MOST_OTHERS = 3
@@ -150,7 +150,7 @@ class Evidence:
         self._made: dict[Any, Any] = {}
         self.study: dict[str, Any] = results.study
         self.parameters: DataFrame = results.parameters
-        self.unit = results.unit
+        self.unit = unit_of(self.study)
         self.runs = ordered(outcomes(results.runs, self.parameters, self.unit), self.study)
         budgets = Series("", index=self.runs.index)
         if self.study.get("budget_per_parameter"):
@@ -323,6 +323,11 @@ def wide_runs(evidence: Evidence) -> DataFrame:
         values |= {f"{name}{end}": wide["run"].map(own[key]) for key, end in columns.items()}
     # at once: column by column, those of 40 parameters leave a table in pieces
     return wide.join(DataFrame(values, index=wide.index))
+
+
+def unit_of(study: dict[str, Any]) -> str:
+    """Return the unit of the records of a study, SI; older ones do not tell it."""
+    return str(study.get("unit", SPEED_UNIT))
 
 
 def outcomes(runs: DataFrame, parameters: DataFrame, unit: str) -> DataFrame:
