@@ -10,7 +10,6 @@ import json
 import sys
 import warnings
 from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
@@ -52,8 +51,9 @@ def main(words: Sequence[str]) -> int:
     open_tasks = [t for t in tasks(options.size) if not file_of(options.folder, t).exists()]
     close = partial(closed, options.folder, options.seed, options.without_left_out)
     print(f"{len(open_tasks)} campaigns to close", flush=True)
-    with ProcessPoolExecutor(options.jobs, get_context("spawn"), max_tasks_per_child=TASKS_OF_PROCESS) as pool:
-        for line in pool.map(close, open_tasks):
+    # not an executor of concurrent.futures: that of Python 3.11 may stop for ever where it replaces a process
+    with get_context("spawn").Pool(options.jobs, maxtasksperchild=TASKS_OF_PROCESS) as pool:
+        for line in pool.imap(close, open_tasks):
             print(line, flush=True)
     return 0
 
