@@ -4,8 +4,7 @@ Records are simulated at the estimate, noise as it was measured is added, and th
 the estimate: once for each draw of the noise. The scatter of the draws is that of the estimator.
 Source: Efron, Tibshirani 1993, chapter 6.
 All draws are refined side by side, each by a CMA-ES of its own (Hansen 2016, arXiv:1604.00772), so that one step of all
-of them is one population of the engine. Parameters are whitened by the Cramer-Rao covariance at the estimate. First
-steps are as wide as the scatter that is found: from shorter ones a fitness with many minima keeps to the nearest.
+of them is one population of the engine. Parameters are whitened by the Cramer-Rao covariance at the estimate.
 """
 
 from collections.abc import Callable
@@ -37,7 +36,7 @@ from armid.problem.space import Space
 FIRST_DRAWS, MANY_DRAWS = 100, 400
 # Skewness above which a standard deviation says too little; of 100 normal draws it scatters by 0.24.
 SKEWED = 0.5
-# Least first step of a refinement, and that at which it has converged, in standard deviations of the Cramer-Rao bound.
+# First step of a refinement, and the step at which it has converged, in standard deviations of the Cramer-Rao bound.
 FIRST_STEP, LAST_STEP = 2.0, 0.02
 # Generations after which a draw does not converge, and the share of such draws that leaves no interval.
 MOST_GENERATIONS, MOST_LOST = 400, 0.05
@@ -130,7 +129,6 @@ class Task:
         self.weights, self.sizes = weights_of(fitness, replays), output_sizes(replays)
         self.ends = np.cumsum([r.record.n_samples for r in replays])[:-1]
         self.measured = np.concatenate([r.measured for r in replays])
-        self.first_step = FIRST_STEP
 
     def noises(self, rng: np.random.Generator, n_draws: int) -> Array:
         """Return the measured signals and those of the draws, the records end to end, (1 + n_draws, n_samples)."""
@@ -185,7 +183,7 @@ class Task:
 
 def refined(task: Task, measured: Array, rng: np.random.Generator, progress: Callable[[Refined], bool]) -> Scatter:
     """Minimise the fitness for each draw from the estimate; the first of them is the measurement itself."""
-    searches, state = ParallelCmaes(len(measured), len(task.x), task.first_step), Refined(len(measured) - 1)
+    searches, state = ParallelCmaes(len(measured), len(task.x)), Refined(len(measured) - 1)
     for _ in range(MOST_GENERATIONS):
         moving = searches.moving
         state.used = int(np.count_nonzero(~moving[1:]))
@@ -194,9 +192,6 @@ def refined(task: Task, measured: Array, rng: np.random.Generator, progress: Cal
         if not moving.any():
             break
         searches.step(moving, rng, partial(task.values, measured=measured[moving]))
-    if np.std(searches.best[1:], axis=0).max() > task.first_step:
-        task.first_step *= 2.0
-        return refined(task, measured, rng, progress)
     lost, draws = searches.moving, task.candidates(searches.best)
     if not np.isfinite(searches.value).all() or lost[1:].mean() > MOST_LOST:
         n_lost = f"{lost[1:].sum()} of {state.budget}"
@@ -218,7 +213,7 @@ def refined(task: Task, measured: Array, rng: np.random.Generator, progress: Cal
 class ParallelCmaes:
     """A CMA-ES for each draw, all of them arrays over the draws; the start is 0, the unit a standard deviation."""
 
-    def __init__(self, n_draws: int, n: int, first_step: float) -> None:
+    def __init__(self, n_draws: int, n: int) -> None:
         self.n, self.size = n, 4 + int(3 * np.log(n))
         parents = self.size // 2
         weights = np.log(parents + 0.5) - np.log(np.arange(1, parents + 1))
@@ -232,7 +227,7 @@ class ParallelCmaes:
         self.expected = np.sqrt(n) * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n**2))
         self.mean, self.best = np.zeros((n_draws, n)), np.zeros((n_draws, n))
         self.value = np.full(n_draws, np.inf)
-        self.sigma = np.full(n_draws, first_step)
+        self.sigma = np.full(n_draws, FIRST_STEP)
         self.covariance = np.tile(np.eye(n), (n_draws, 1, 1))
         self.step_path, self.path = np.zeros((n_draws, n)), np.zeros((n_draws, n))
 
