@@ -12,7 +12,7 @@ from armid.inference import infer, moves, prepared, search
 from armid.inference.candidates import EffectKey
 from armid.inference.decisions import WINDOW
 from armid.inference.evidence import expansion_of, forecast
-from armid.inference.hypothesis import Hypothesis
+from armid.inference.hypothesis import Hypothesis, may_join
 from armid.inference.kinds import effects, faults
 from armid.inference.library import Activation, Library
 from armid.inference.model import best_along
@@ -273,3 +273,17 @@ def test_the_fewest_effects_that_predict_as_the_best_are_in_force(monkeypatch, s
     fits = dict(zip((NONE, ONE, TWO), squares, strict=True))
     monkeypatch.setattr(CARRY_OVER, "misses", np.log)
     assert CARRY_OVER.predicting_best((TWO, NONE, ONE), fits, LIBRARY) == best
+
+
+def test_a_record_is_wrong_in_one_way_and_most_records_are_not_wrong():
+    late, fast, bias, other = (Hypothesis("record", name) for name in
+                               ("late@a.csv", "clock@a.csv", "offset@a.csv:speed", "offset@a.csv:angle"))  # fmt: skip
+    second = Hypothesis("record", "late@b.csv")
+    effect = Hypothesis("effect", "coulomb", "tanh")
+    assert not may_join(frozenset({late}), fast, 9)
+    assert not may_join(frozenset({late}), bias, 9)
+    assert may_join(frozenset({bias}), other, 9)
+    assert [may_join(frozenset({late}), second, n) for n in (2, 3, 4)] == [False, False, True]
+    assert may_join(frozenset(), late, 2)
+    assert may_join(frozenset({late}), effect, 2)
+    assert not may_join(frozenset({effect}), Hypothesis("effect", "coulomb"), 2)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from armid.errors import ArmidError
 from armid.inference.model import Fit
 from armid.inference.unknowns import Unknown, columns_about, freed
 
@@ -68,6 +69,11 @@ def exact(columns, truth):
 def test_unknowns_come_to_their_best_values_however_far_these_are(truth):
     columns = 10.0 * RNG.normal(size=(50, 2))
     assert freed_of(columns, truth) == pytest.approx(exact(columns, truth), abs=0.01)
+
+
+def test_what_diverges_where_it_starts_is_refused():
+    with pytest.raises(ArmidError, match="diverges where it starts"):
+        freed_of(np.full((50, 1), np.nan), (1.0,))
 
 
 def test_unknowns_whose_columns_nearly_cancel_move_together():

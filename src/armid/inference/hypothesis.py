@@ -36,9 +36,29 @@ class Hypothesis:
         """Name of the unknown that is the size of a fault or drift."""
         return f"drift of {self.name}" if self.kind == "drift" else self.name
 
+    @property
+    def record(self) -> tuple[str, str]:
+        """File of the record that is wrong, and the output whose sensor is, "" for the whole file."""
+        file, _, output = self.name.rpartition("@")[2].partition(":")
+        return file, output
+
 
 # A model in words: the hypotheses that hold in it.
 Hypotheses = frozenset[Hypothesis]
+
+
+def may_join(model: Hypotheses, hypothesis: Hypothesis, n_records: int) -> bool:
+    """Tell whether a model may hold a hypothesis more.
+
+    A record, or one sensor of it, is wrong in one way, and no more than half of the records are: what is wrong in most
+    of them is the model. Several faults together could follow whatever it lacks.
+    """
+    if hypothesis.kind != "record":
+        return all(h.public != hypothesis.public for h in model)
+    file, output = hypothesis.record
+    wrong = [h.record for h in model if h.kind == "record"]
+    is_new = not any(f == file and (not o or not output or o == output) for f, o in wrong)
+    return is_new and 2 * len({file, *(f for f, _ in wrong)}) <= max(n_records, 2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,7 @@ from armid.inference.candidates import EffectKey
 from armid.inference.checks import is_significant
 from armid.inference.decisions import HOPELESS, REFITTED, WINDOW
 from armid.inference.evidence import expansion_of, forecast
-from armid.inference.hypothesis import Hypotheses, Hypothesis, Proposal, words
+from armid.inference.hypothesis import Hypotheses, Hypothesis, Proposal, may_join, words
 from armid.inference.kinds import drifts, effects, faults, unknown
 from armid.inference.library import Library
 from armid.inference.model import Fit, finished, unless_diverged, with_free_shapes
@@ -258,9 +258,8 @@ def expand(exploration: Exploration, model: Hypotheses) -> None:
     library.say(f"expanding {words(model) if model else 'the declared model'}")
     about, held = expansion_of(fit, scale, library), expansion_of(fit, scale, library, with_doubts=False)
     proposals: list[Proposal] = effects.propose(fit, exploration.known, library)
-    names = {h.public for h in model}
     others = [*faults.propose(fit, exploration.faults, library), *drifts.propose(fit, exploration.drifts)]
-    others = [p for p in others if p.hypothesis.public not in names]
+    others = [p for p in others if may_join(model, p.hypothesis, len(fit.records.data.records))]
     ahead = [forecast(about, p) for p in proposals]
     ahead_held = [forecast(held, p) for p in proposals]
     beside = [forecast(about, p) for p in others]

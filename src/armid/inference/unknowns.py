@@ -147,12 +147,14 @@ def freed(
 
     base: the records of the fit before any of the unknowns was moved. weight: of each square, see `evidence.Scale`.
     limit: see `descend`. rough: to about where it arrives.
-    Raises ArmidError where it diverges.
+    Raises ArmidError where it diverges at its start.
     """
     known = {f.unknown.name: f.value for f in fit.others}
     kept = {f.unknown.name: f.column for f in fit.others}
     values, z = np.array([known.get(u.name, 0.0) for u in unknowns]), fit.z
     (cost,), (residual,) = costs_at(base, unknowns, values[np.newaxis], z[np.newaxis], weight)
+    if not np.isfinite(cost):
+        raise ArmidError("a fit with further unknowns diverges where it starts: other bounds are expected")
     damping, columns, is_new = FIRST_DAMPING, columns_about(base.plain, unknowns, values, z, kept), not kept
     for _ in range(MOST_ROUGH if rough else MOST_ITERATIONS):
         problem = moved(base, unknowns, values)
@@ -183,8 +185,6 @@ def freed(
         is_new = has_arrived or fall < FORETOLD * float(2.0 * slope @ step - step @ square @ step)
         if is_new:
             columns = columns_about(base.plain, unknowns, values, z, {})
-    if not np.isfinite(cost):
-        raise ArmidError("a fit with further unknowns diverged: other bounds are expected")
     return landed(fit, base, unknowns, values, z, residual, columns)
 
 
