@@ -13,7 +13,7 @@ from armid.engine import Schedule, simulate
 from armid.errors import ArmidError
 from armid.model import EFFECTS, PLANTS, Manoeuvre, Model, Output
 from armid.model.effects.sensor import sensor_effects
-from armid.record import read_campaign
+from armid.record import read_campaign, write_campaign
 from armid.record.table import read_table
 from commands import ended
 from winch import winch
@@ -163,3 +163,17 @@ def test_sensors_of_a_speed_fit_no_output_in_another_unit():
     assert (Model(plant) + found["belt_speed_bias"]).parameters["belt_speed_bias.bias"].unit == "m/s"
     assert Model(plant) + found["belt_speed_lag"]
     assert not sensor_effects(winch)
+
+
+def test_a_force_far_above_the_scale_of_effort_is_no_motion_that_diverges(tmp_path):
+    strong = replace(two_inertias, quantities={**two_inertias.quantities, "push": lambda v: 1e5 * v},
+                     outputs=(two_inertias.outputs[0], Output("push", "push", "N")))  # fmt: skip
+    speed = np.sin(np.linspace(0.0, 9.0, 700))
+    columns = {"time_s": INTERVAL * np.arange(700), "motor_speed_rad_s": speed, "push_N": 1e5 * speed,
+               "drive_N_m": drive(700, 1.0)}  # fmt: skip
+    toml = 'name = "strong"\nplant = "two_inertias"\n[[records]]\nfile = "a.csv"\nrole = "train"\n'
+    toml += "".join(f"constants.{name} = 0.0\n" for name in STARTS)
+    campaign = read_campaign(write_campaign(tmp_path / "strong", toml, {"a.csv": columns}), {"two_inertias": strong})
+    assert [plant.sizes for plant in (strong, campaign.plant)] == [
+        (strong.scales.speed, strong.scales.effort), (strong.scales.speed, pytest.approx(1e5, rel=1e-3)),
+    ]  # fmt: skip

@@ -157,6 +157,7 @@ class Output:
     columns: headers of a record that bring it, each with the end of a unit (`hub_angle_deg`); none: the name with each.
     port: where effects of its sensor (bias, scale, lag) are added, a port that stands in the equation of the signal
         (recorded = angle + port); "" for none.
+    size: the largest effort, current or voltage that records hold, SI; a campaign sets it.
 
     Raises ModelError for another unit, and for a column without the end of the unit.
     """
@@ -166,6 +167,7 @@ class Output:
     unit: str
     columns: tuple[str, ...] = ()
     port: str = ""
+    size: float = 0.0
 
     def __post_init__(self) -> None:
         check_name(self.name, "output")
@@ -318,10 +320,13 @@ class Plant:
 
     @property
     def sizes(self) -> tuple[float, ...]:
-        """What is large for each output, SI: a speed as the scale says, the way of a second, an effort, else 1."""
+        """What is large for each output, SI: a speed as the scale says, the way of a second, an effort, else 1.
+
+        A force behind a gear may be far above the scale of effort: what records hold counts where it is larger.
+        """
         size = dict.fromkeys(("rad/s", "m/s", "rad", "m"), self.scales.speed)
         size |= dict.fromkeys(("N", "N m"), self.scales.effort)
-        return tuple(size.get(o.unit, 1.0) for o in self.outputs)
+        return tuple(max(size.get(o.unit, 1.0), o.size) for o in self.outputs)
 
     @property
     def records_omega(self) -> bool:

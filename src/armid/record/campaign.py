@@ -351,11 +351,19 @@ def scaled(plant: Plant, records: Sequence[Record], where: str) -> Plant:
     """Return the plant with the sizes of effort and speed that its train records show, where it asks for that.
 
     Effort = max |gain x drive| of the first input, or the moment of gravity where the drive rests.
-    Speed = max |measured speed|, or of the change of a position over a hundredth of the record.
+    Speed = max |measured speed|, or of the change of a position over a hundredth of the record. Outputs that are no
+    motion get the largest value that was measured.
     """
+    train = [r for r in records if r.role == "train"]
+    largest: dict[str, float] = {}
+    for signal in (s for r in train for s in r.signals if s.unit in ("N", "N m", "A", "V")):
+        name = signal.output or plant.outputs[0].name
+        largest[name] = max(largest.get(name, 0.0), float(np.max(np.abs(signal.measured))))
+    if largest:
+        sized = (replace(o, size=largest.get(o.name, 0.0)) for o in plant.outputs)
+        plant = replace(plant, output="", output_unit="", outputs=tuple(sized))
     if not plant.scales_from_records:
         return plant
-    train = [r for r in records if r.role == "train"]
     speed = max(map(largest_speed, (one for r in train for one in r.each)))
     if speed == 0.0:
         raise ArmidError(f"{where}: no train record holds a speed or a position, from which the scale of speed comes: "
