@@ -11,6 +11,7 @@ from armid.report.style import MOST_COLOURED, PALE, named_lines, panels
 from armid.study.analyses.analysis import TARGETS
 from armid.study.analyses.convergence import (
     convergence_figure,
+    ecdf_figure,
     expected_running_time,
     median,
     running_time,
@@ -41,6 +42,19 @@ def test_table_takes_the_tolerances_and_counts_hits():
     frame = running_time(evidence, hits, {"1 %": 1e-2, "0.1 %": 1e-3}, "t", "", "").frame
     assert frame.loc[0, "1 %"] == "1200 (50 %)"
     assert frame.loc[0, "0.1 %"] == "inf (0 %)"
+
+
+def test_lines_are_named_in_the_order_of_their_colours():
+    hits = np.full((4, 51), np.inf)
+    hits[:, :10], hits[:2, :30] = 5.0, 7.0
+    evidence = SimpleNamespace(
+        groups={"s": {"near": np.array([2, 3]), "far": np.array([0, 1])}}, colours={"near": 0, "far": 1},
+        histories=SimpleNamespace(grid=np.array([1, 10, 100]), error_hits=hits),
+    )  # fmt: skip
+    figure = ecdf_figure(evidence)
+    assert named(figure.axes[0]) == ["near", "far"]
+    assert figure.axes[0].get_ylim() == (0.0, 1.0)
+    plt.close(figure)
 
 
 def test_the_first_six_lines_have_a_colour_each_and_all_others_are_grey():

@@ -11,9 +11,11 @@ from armid.identifiers.local import ALGORITHMS, CENTRAL, NO_PROGRESS, slopes, st
 from armid.identifiers.search import Calls
 
 FREE = ("nelder_mead", "bobyqa", "sbplx", "cobyla")
+# A seed whose start is in the middle of the box, where no step has to turn.
+INNER = 6
 
 
-def nlopt_alone(name, problem, start, n, step):
+def nlopt_alone(name, problem, start, n):
     """The points that NLopt asks for when it calls the function itself, no thread and no pymoo around it."""
     asked = []
 
@@ -29,21 +31,29 @@ def nlopt_alone(name, problem, start, n, step):
     search = nlopt.opt(getattr(nlopt, ALGORITHMS[name][1]), 3)
     search.set_lower_bounds(np.zeros(3))
     search.set_upper_bounds(np.ones(3))
-    search.set_initial_step(step)
+    search.set_initial_step(0.05)
     search.set_maxeval(n)
     search.set_min_objective(height)
     search.optimize(start)
     return np.array(asked)
 
 
-@pytest.mark.parametrize(("name", "options"), [*((name, {}) for name in ALGORITHMS), ("bobyqa", {"initial_step": 0.2})])
-def test_asks_for_what_nlopt_alone_asks_for(name, options):
+@pytest.mark.parametrize("name", ALGORITHMS)
+def test_asks_for_what_nlopt_alone_asks_for(name):
     problem = Bowl()
-    ran(name, problem, 60, **options)
+    ran(name, problem, 60)
     asked = problem.unit(np.array([batch[0] for batch in problem.batches]))
-    n, step = min(len(asked), 12 if name in FREE else 4), options.get("initial_step", 0.05)
-    alone = nlopt_alone(name, problem, asked[0], n, step)
+    alone = nlopt_alone(name, problem, asked[0], min(len(asked), 12 if name in FREE else 4))
     np.testing.assert_allclose(asked[: len(alone)], alone, atol=1e-7 if name in FREE else 1e-5)
+
+
+@pytest.mark.parametrize("name", FREE)
+def test_the_first_step_is_the_one_that_was_asked_for(name):
+    for step in (0.05, 0.2):
+        problem = Bowl()
+        ran(name, problem, 2, seed=INNER, initial_step=step)
+        first, second = problem.unit(np.concatenate(problem.batches)[:2])
+        assert np.abs(second - first).max() == pytest.approx(step, rel=1e-9)
 
 
 @pytest.mark.parametrize("name", [*FREE, "lbfgs", "slsqp", "least_squares"])

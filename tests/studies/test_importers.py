@@ -121,7 +121,7 @@ def test_the_measured_axis(tmp_path):
     train, holdout = campaign.records
     assert train.n_samples == holdout.n_samples == 24841
     assert train.duration == pytest.approx(24.84)
-    assert train.irregularity == ""
+    assert train.irregularity is None
     assert not train.is_noise_free
     assert train.constants["gain"] == pytest.approx(35.15065, abs=1e-5)
     assert campaign.plant.scales.effort == pytest.approx(152.05, abs=0.01)

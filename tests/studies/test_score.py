@@ -118,6 +118,13 @@ def scored(suite):
     return judge_all(key, {name: read_json(file) for name, file in files.items() if file.is_file()})
 
 
+def test_a_campaign_without_a_report_is_missing(suite):
+    rows, missing = scored(suite)
+    assert ([row["judgement"] for row in rows], [row["judgement"] for row in missing]) == (["right"], ["missing"])
+    first = targets_of(rows, len(missing))[0]
+    assert (first.question, first.found, first.among, first.met) == ("campaigns without a report", 1, 2, False)
+
+
 @pytest.mark.parametrize(
     ("text", "sentence"), [("{", "is not JSON"), ("{}", "is not a report of a closed loop"), ("[]", "is not a report")]
 )

@@ -62,7 +62,7 @@ def simulate_command(
     units = {name: p.unit for name, p in simulated.model.parameters.items()}
     say(*(f"{name} = {value:.9g} {units[name]}".removesuffix(" 1") for name, value in simulated.parameters.items()))
     for record in simulated.campaign.records:
-        if record.irregularity:
+        if record.irregularity is not None:
             say(f"{record.file}: on its even grid of {record.manoeuvre.interval:.6g} s, as its times are irregular")
     say(f"wrote {len(files)} files to {out}")
     give(parameters=simulated.parameters, folder=out, files=files)

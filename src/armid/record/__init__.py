@@ -9,17 +9,17 @@ resample  even time grids out of the times of a file; which samples count
 start     the state from which a record or a piece of it is simulated
 dialect   CSV files with other separators, decimals, comments, units, encodings
 sensor    what a sensor does: step, hold, noise; samples that are no data: clipped, repeated, wild ones
-record    Record (one file), its Signals, its Pieces: what all of that is put into
+record    Record (one file), its Signals, its Pieces, Irregularity: what all of that is put into
 """
 
 from armid.record.campaign import Campaign, read_campaign, write_campaign
-from armid.record.record import Piece, Record, RecordWarning, Signal
+from armid.record.record import Irregularity, Piece, Record, RecordWarning, Signal
 from armid.record.resample import IrregularSamplingWarning
 from armid.record.schema import Override
 from armid.record.sensor import Noise
 from armid.record.table import write_table
 
 __all__ = [
-    "Campaign", "IrregularSamplingWarning", "Noise", "Override", "Piece", "Record", "RecordWarning",
+    "Campaign", "IrregularSamplingWarning", "Irregularity", "Noise", "Override", "Piece", "Record", "RecordWarning",
     "Signal", "read_campaign", "write_campaign", "write_table",
 ]  # fmt: skip

@@ -168,7 +168,7 @@ class New:
         self.n_rest = int(np.searchsorted(self.at, timing.first))
         self.rest, self.motion = self.values[: self.n_rest], self.values[self.n_rest :]
         apart = np.diff(self.at[self.n_rest :])
-        even = not timing.irregularity and apart.size > 0 and apart.min() == apart.max()
+        even = timing.irregularity is None and apart.size > 0 and apart.min() == apart.max()
         self.uneven = None if even else self.times[self.n_rest :]
 
     def since(self, counted: Array) -> Mask:

@@ -22,6 +22,18 @@ class RecordWarning(UserWarning):
     """Say what had to be assumed to read a record, or what of it is not data."""
 
 
+@dataclass(frozen=True)
+class Irregularity:
+    """How irregular the times of a file are.
+
+    share: of the intervals, off by more than 1 % of the median. largest_gap: in median intervals; at_s: its begin.
+    """
+
+    share: float
+    largest_gap: float
+    at_s: float
+
+
 @dataclass(frozen=True, eq=False)
 class StartCorrection:
     """How the signals of a piece answer to its start, and how much of it a candidate lacks.
@@ -147,8 +159,8 @@ class Record:
     and `each` holds a record for each. pieces: cut to the window; one piece unless `restart_s` was given. whole_pieces:
     the same before the window. earliest: first sample that may be in a window. columns: header -> the file's other
     columns on the grid, in the unit of the header. repeat_of: file of the record whose manoeuvre this one repeats, or
-    "". irregularity: of the file's times, in words, "" where they were even. input_noise: measured input -> its noise,
-    SI; without those that are exact.
+    "". irregularity: None where the file's times were even. input_noise: measured input -> its noise, SI; without
+    those that are exact.
     """
 
     file: str
@@ -161,7 +173,7 @@ class Record:
     columns: Mapping[str, Array] = field(default_factory=dict)
     repeat_of: str = ""
     restart_s: float | None = None
-    irregularity: str = ""
+    irregularity: Irregularity | None = None
     input_noise: Mapping[str, InputNoise] = field(default_factory=dict)
 
     def __repr__(self) -> str:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from armid.errors import ArmidError
 from armid.model import Array
-from armid.record.record import Record, RecordWarning
+from armid.record.record import Irregularity, Record, RecordWarning
 from armid.record.sensor import Mask
 
 FEWEST_SAMPLES = 20
@@ -32,8 +32,7 @@ class Timing:
     """How the samples of a file come onto an even grid.
 
     first: row of the first sample at or after the start. earliest: first sample of the grid that was measured and is
-    not before t = 0. resampled: False when the rows from `first` on are the samples of the grid. irregularity: of the
-    times, in words, "" for even ones.
+    not before t = 0. resampled: False when the rows from `first` on are the samples of the grid.
     """
 
     start: float
@@ -42,7 +41,7 @@ class Timing:
     first: int
     earliest: int
     resampled: bool
-    irregularity: str
+    irregularity: Irregularity | None
 
     def grid(self) -> Array:
         return self.start + self.interval * np.arange(self.n_samples, dtype=np.float64)
@@ -71,10 +70,13 @@ def timing_of(times: Array, from_rest: bool, file: str) -> Timing:
     check_number(n_samples, f"{file}:", place)
     # a plant from rest may have lost its sample at t = 0; an axis may begin before 0, and what is before 0 never counts
     earliest = 0 if from_rest and first > 0 else int(np.ceil((max(begin, 0.0) - start) / interval - EVEN_TIMES))
-    irregularity = "" if even else irregularity_of(motion)
-    if irregularity:
-        said = f"{file}: irregular sampling: {irregularity}; resampled evenly at {interval:.6g} s"
-        warnings.warn(said, IrregularSamplingWarning, stacklevel=2)
+    irregularity = None if even else irregularity_of(motion)
+    if irregularity is not None:
+        share, widest = irregularity.share, irregularity.largest_gap
+        message = (f"{file}: irregular sampling: {share:.2%} of {motion.size - 1} intervals are off by more than 1 %, "
+                   f"the largest is {widest:.3g} times the median, at t = {irregularity.at_s:.6g} s")  # fmt: skip
+        message += ", a large gap that is bridged by a straight line" if widest > LARGE_GAP else ""
+        warnings.warn(f"{message}; resampled evenly at {interval:.6g} s", IrregularSamplingWarning, stacklevel=2)
     return Timing(start, interval, n_samples, first, max(earliest, 0), resampled, irregularity)
 
 
@@ -117,17 +119,15 @@ def printed_resolution(times: Array, interval: float) -> float:
     return 0.0
 
 
-def irregularity_of(times: Array) -> str:
-    """Return how irregular times are, in words, "" where their rounding explains it."""
+def irregularity_of(times: Array) -> Irregularity | None:
+    """Return how irregular times are, None where their rounding explains it."""
     intervals = np.diff(times)
     median = float(np.median(intervals))
     relative = intervals / median
     if np.max(np.abs(relative - 1)) <= EVEN_TIMES + 1.01 * printed_resolution(times, median) / median:
-        return ""
-    widest, share = int(np.argmax(relative)), np.mean(np.abs(relative - 1) > 0.01)
-    bridged = ", a large gap that is bridged by a straight line" if relative[widest] > LARGE_GAP else ""
-    return (f"{share:.2%} of {intervals.size} intervals are off by more than 1 %, the largest is "
-            f"{relative[widest]:.3g} times the median, at t = {times[widest]:.6g} s{bridged}")  # fmt: skip
+        return None
+    widest = int(np.argmax(relative))
+    return Irregularity(float(np.mean(np.abs(relative - 1) > 0.01)), float(relative[widest]), float(times[widest]))
 
 
 def grid_size(times: Array, start: float, interval: float, file: str) -> int:
