@@ -17,7 +17,6 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from armid.engine.transpile import SourceText, local_name
 from armid.model import Model
@@ -56,16 +55,35 @@ class Late:
     delay: int
 
 
-# What the template is filled with: local names of one model, and its equations.
-#
-# equations: text of the functions `fixed_values`, `start_values`, `rates`, `guards`, `recorded` and what they call.
-# parameters, constants: what each candidate is given, in order. fixed: quantities that do not move, computed once.
-# states, inputs, latches: what moves, each in its order. outputs: recorded signals. latch_guards: the guard of each
-# latch; kinks: the other guards; jumping_guards: whether a kink may jump at a sample, as only inputs do. wide: whether
-# there are so many effects that what is rarely needed is compiled but once. delays: sums of parameters by which inputs
-# and states are late; the motion sees the first n_moving of them, and they cut each sample interval where inputs drive
-# it, as what is late jumps or bends there. late_inputs, late_states: what is late, by which delay.
-KernelParts = dict[str, Any]
+@dataclass(frozen=True)
+class KernelParts:
+    """Hold what the template is filled with: local names of one model, and its equations.
+
+    equations: text of the functions `fixed_values`, `start_values`, `rates`, `guards`, `recorded` and what they call.
+    parameters, constants: what each candidate is given, in order. fixed: quantities that do not move, computed once.
+    states, inputs, latches: what moves, each in its order. outputs: recorded signals. latch_guards: the guard of each
+    latch; kinks: the other guards; jumping_guards: whether a kink may jump at a sample, as only inputs do. wide:
+    whether there are so many effects that what is rarely needed is compiled but once. delays: sums of parameters by
+    which inputs and states are late; the motion sees the first n_moving of them, and they cut each sample interval
+    where inputs drive it, as what is late jumps or bends there. late_inputs, late_states: what is late, by which delay.
+    """
+
+    equations: str
+    parameters: list[str]
+    constants: list[str]
+    fixed: list[str]
+    states: list[str]
+    inputs: list[str]
+    latches: list[str]
+    outputs: list[str]
+    latch_guards: list[str]
+    kinks: list[str]
+    jumping_guards: bool
+    wide: bool
+    delays: list[str]
+    n_moving: int
+    late_inputs: list[Late]
+    late_states: list[Late]
 
 
 def kernel_parts(model: Model) -> KernelParts:
@@ -83,32 +101,32 @@ def kernel_text(parts: KernelParts) -> str:
         keep_trailing_newline=True, undefined=StrictUndefined, loader=FileSystemLoader(TEMPLATE.parent),
     )  # fmt: skip
     environment.filters |= {"each": each, "listed": listed, "nested": nested}
-    states, inputs, latches, late_of = (parts[name] for name in ("states", "inputs", "latches", "late_states"))
-    guards = [*parts["latch_guards"], *parts["kinks"]]
+    states, inputs, latches, late_of = parts.states, parts.inputs, parts.latches, parts.late_states
+    guards = [*parts.latch_guards, *parts.kinks]
     times = [f"time_of_{k}" for k in latches]
     carried = [*latches, *times, *states, *(f"ga_{g}" for g in guards)]
     late_states = [one.name for one in late_of]
-    driven = [*inputs, *(one.name for one in parts["late_inputs"])]
-    prefixed = ((states, OF_STATES), (driven, OF_INPUTS), (parts["outputs"], OF_OUTPUTS), (guards, OF_GUARDS),
+    driven = [*inputs, *(one.name for one in parts.late_inputs)]
+    prefixed = ((states, OF_STATES), (driven, OF_INPUTS), (parts.outputs, OF_OUTPUTS), (guards, OF_GUARDS),
                 (carried, OF_CARRIED), (late_states, OF_LATE_STATES))  # fmt: skip
     lists = {prefix: listed(names, f"{prefix}_") for names, prefixes in prefixed for prefix in prefixes}
     lists |= {
-        "x": listed(states), "x_n": listed(states, "n_"), "fixed": listed(parts["fixed"]),
+        "x": listed(states), "x_n": listed(states, "n_"), "fixed": listed(parts.fixed),
         "latches": listed(latches), "latches_n": listed(latches, "n_"), "times": listed(times),
-        "new": listed(latches, "new_"), "given": listed(parts["parameters"] + parts["constants"]),
+        "new": listed(latches, "new_"), "given": listed(parts.parameters + parts.constants),
         "judging": f"judged, {listed(states, 'per_')}",
     }  # fmt: skip
     remembered = list(dict.fromkeys(one.of for one in late_of))
-    numbers = [str(i) for i in range(len(parts["delays"]))]
+    numbers = [str(i) for i in range(len(parts.delays))]
     of_delays = [listed(numbers, f"{word}_") for word in ("late_by", "whole", "rest", "using")]
     given = "delayed, history, steps_kept, place, per_part, part, edges, numbers, " + "".join(of_delays)
     return environment.get_template(TEMPLATE.name).render(
-        parts | {"latch_names": latches} | lists, guards=guards, carried=carried, driven=driven, late_names=late_states,
-        block=BLOCK, max_cuts=MAX_CUTS, longest=LONGEST_SPAN,
-        switches=list(zip(latches, parts["latch_guards"], strict=True)), remembered=remembered,
+        vars(parts) | {"latch_names": latches} | lists, guards=guards, carried=carried, driven=driven,
+        late_names=late_states, block=BLOCK, max_cuts=MAX_CUTS, longest=LONGEST_SPAN,
+        switches=list(zip(latches, parts.latch_guards, strict=True)), remembered=remembered,
         last_rates=listed(remembered, "k4_"), late_by=of_delays[0], late_by_names=[f"late_by_{i}" for i in numbers],
-        late_given=given if late_of else "", n_cutting=parts["n_moving"] if inputs else 0,
-        felt=sorted({one.delay for one in late_of if one.delay < parts["n_moving"]}),
+        late_given=given if late_of else "", n_cutting=parts.n_moving if inputs else 0,
+        felt=sorted({one.delay for one in late_of if one.delay < parts.n_moving}),
         delays_of_states={one.delay for one in late_of},
     )  # fmt: skip
 
@@ -171,7 +189,7 @@ class Emitter:
             "parameters": model.parameters, "constants": model.constants, "fixed": fixed, "states": model.states,
             "inputs": inputs, "latches": model.latches, "latch_guards": latch_guards, "kinks": kinks,
         }  # fmt: skip
-        names: KernelParts = {name: [variable(k) for k in keys] for name, keys in lists.items()}
+        names = {name: [variable(k) for k in keys] for name, keys in lists.items()}
         names["fixed"] += used
         names["outputs"] = [o.name for o in model.plant.outputs]
         given = [*names["parameters"], *names["constants"]]
@@ -191,10 +209,10 @@ class Emitter:
             texts.append(self.function("delay_values", given, [], [f"{by} + 0.0" for by in delays]))
         equations = self.function_texts() + "\n\n".join(texts)
         jumping = bool(kinks) and self.uses(guards, [*inputs, *(n.key for n in self.graph.of_kind("late_input"))])
-        return names | {
-            "equations": equations, "jumping_guards": jumping, "wide": bool(self.strengths), "delays": delays,
-            "n_moving": n_moving, "late_inputs": late_inputs, "late_states": late_states,
-        }  # fmt: skip
+        return KernelParts(
+            equations, **names, jumping_guards=jumping, wide=bool(self.strengths), delays=delays, n_moving=n_moving,
+            late_inputs=late_inputs, late_states=late_states,
+        )  # fmt: skip
 
     def late_leaves(self, moving: list[str], recorded: list[str]) -> tuple[list[str], int, list[Late], list[Late]]:
         """Return the delays of a model, how many of them the motion sees, and what is late by them.
