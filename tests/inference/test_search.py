@@ -276,9 +276,11 @@ def test_the_fewest_effects_that_predict_as_the_best_are_in_force(monkeypatch, s
 
 
 def test_a_record_is_wrong_in_one_way_and_most_records_are_not_wrong():
-    late, fast, bias, other = (Hypothesis("record", name) for name in
-                               ("late@a.csv", "clock@a.csv", "offset@a.csv:speed", "offset@a.csv:angle"))  # fmt: skip
-    second = Hypothesis("record", "late@b.csv")
+    late, fast, bias, other, second = (
+        Hypothesis("record", name, record=record) for name, record in
+        (("late", ("a.csv", "")), ("clock", ("a.csv", "")), ("offset of speed", ("a.csv", "speed")),
+         ("offset of angle", ("a.csv", "angle")), ("late b", ("b.csv", "")))
+    )  # fmt: skip
     effect = Hypothesis("effect", "coulomb", "tanh")
     assert not may_join(frozenset({late}), fast, 9)
     assert not may_join(frozenset({late}), bias, 9)

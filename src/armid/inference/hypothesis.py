@@ -17,7 +17,8 @@ class Hypothesis:
     kind: "effect" (an effect of the library), "record" (a fault of one record, or a parameter or constant that is
     another in it), "drift" (one that changes from record to record) or "unknown" (a signal without a form). name: the
     public name. form: which published form of the effect, or the variable on which an unknown signal depends.
-    log_prior: log odds before the data. means: what the kind needs to apply the hypothesis.
+    log_prior: log odds before the data. means: what the kind needs to apply the hypothesis. record: file of the record
+    that is wrong, and the output whose sensor is, "" for the whole file; both "" for other kinds.
     """
 
     kind: str
@@ -25,6 +26,7 @@ class Hypothesis:
     form: str = ""
     log_prior: float = field(default=0.0, compare=False)
     means: Any = field(default=None, compare=False)
+    record: tuple[str, str] = field(default=("", ""), compare=False)
 
     @property
     def public(self) -> tuple[str, str]:
@@ -35,12 +37,6 @@ class Hypothesis:
     def size_name(self) -> str:
         """Name of the unknown that is the size of a fault or drift."""
         return f"drift of {self.name}" if self.kind == "drift" else self.name
-
-    @property
-    def record(self) -> tuple[str, str]:
-        """File of the record that is wrong, and the output whose sensor is, "" for the whole file."""
-        file, _, output = self.name.rpartition("@")[2].partition(":")
-        return file, output
 
 
 # A model in words: the hypotheses that hold in it.
@@ -57,8 +53,8 @@ def may_join(model: Hypotheses, hypothesis: Hypothesis, n_records: int) -> bool:
         return all(h.public != hypothesis.public for h in model)
     file, output = hypothesis.record
     wrong = [h.record for h in model if h.kind == "record"]
-    is_new = not any(f == file and (not o or not output or o == output) for f, o in wrong)
-    return is_new and 2 * len({file, *(f for f, _ in wrong)}) <= max(n_records, 2)
+    is_free = not any(f == file and (not o or not output or o == output) for f, o in wrong)
+    return is_free and 2 * len({file, *(f for f, _ in wrong)}) <= max(n_records, 2)
 
 
 @dataclass(frozen=True, eq=False)

@@ -344,7 +344,7 @@ def library_of(
 N_PROBES_ABOUT, NEAR_VALUE, SUBSTEPS_TRIED = 8, 2.0, (1, 2, 4, 8, 16, 32)
 # From so many steps between samples on it is tried whether rough samples alone ask for them, and which these are: those
 # in which a step is uncertain by such a share of the range of a state.
-FEWEST_SPARED, FEWEST_OF_RANGES, SHARES_OF_ERROR = 4, 8, (1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
+FEWEST_SPARED, SHARES_OF_ERROR = 4, (1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
 # A weak strength, and the weakest from which a fit starts, as shares of the way from the null to a bound; shapes:
 # points along each of 1, 2, 3 ranges.
 WEAK_STRENGTH, WEAKEST_START = 0.03, 0.01
@@ -457,7 +457,7 @@ def quickly_calibrated(
     if good and n >= FEWEST_SPARED:
         # Where steps are fine for the sake of a few samples (friction as it changes its sign), only these need be cut.
         sound = spread[~runs[2 * n].failed]
-        states = simulate(model, manoeuvre, sound, Schedule(max(n, FEWEST_OF_RANGES)), states=True).states
+        states = simulate(model, manoeuvre, sound, Schedule(2 * n), states=True).states
         ranges = np.array([np.max(np.ptp(state, axis=-1)) for state in states.values()])
         for share in SHARES_OF_ERROR:
             tried = replace(schedule, rough=np.where(ranges > 0.0, share * ranges, np.inf))

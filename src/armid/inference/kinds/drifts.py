@@ -99,7 +99,7 @@ def hypotheses(fit: Fit, library: Library) -> list[Hypothesis]:
     return [
         *(Hypothesis("drift", d.name, "", calibration().log_odds("drift", len(drifts)), d) for d in drifts),
         *(Hypothesis("record", f"{one.name.removeprefix(NAMED)}@{one.file}", "",
-                     calibration().log_odds("drift", len(others)), one) for one in others),
+                     calibration().log_odds("drift", len(others)), one, (one.file, "")) for one in others),
     ]  # fmt: skip
 
 

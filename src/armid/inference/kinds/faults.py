@@ -315,12 +315,12 @@ def hypotheses(records: WhiteRecords) -> list[Hypothesis]:
     for index, record in enumerate(records.data.each):
         for fault in faults_of(records, index):
             largest = 1.0 if fault.kind == "label" else fault.largest(record)
-            place = f"{record.file}:{record.output}" if fault.of_sensor else record.file
+            file, output = record.file, record.output if fault.of_sensor else ""
+            place = f"{file}:{output}" if fault.of_sensor else file
             name = f"{fault.kind}{'_' if fault.constant else ''}{fault.constant}@{place}"
-            faults.append((name, OfRecord(index, fault, largest)))
-    return [
-        Hypothesis("record", name, "", calibration().log_odds("record", len(faults)), what) for name, what in faults
-    ]
+            faults.append((name, OfRecord(index, fault, largest), (file, output)))
+    odds = calibration().log_odds("record", len(faults))
+    return [Hypothesis("record", name, "", odds, what, of) for name, what, of in faults]
 
 
 def propose(fit: Fit, known: list[Hypothesis], library: Library) -> list[Proposal]:
