@@ -222,7 +222,8 @@ def campaign_of(
     for name in sheet.constants:
         if all(name in constants for constants in own):
             warnings.warn(f"{where}: constant '{name}' counts nowhere, since every record sets its own", stacklevel=2)
-    plant = scaled(whole.recording(recorded), records, where)
+    train = [r for r in records if r.role == "train"]
+    plant = scaled(with_sizes(whole.recording(recorded), train), train, where)
     parameters = overrides_of(sheet.parameters, plant, effects, where)
     for name in sheet.truth:
         if name not in (names := named_parameters(plant, effects)):
@@ -347,21 +348,21 @@ def original_of(file: str, repeats: Mapping[str, str], where: str) -> str:
     return seen[-1]
 
 
-def scaled(plant: Plant, records: Sequence[Record], where: str) -> Plant:
+def with_sizes(plant: Plant, train: Sequence[Record]) -> Plant:
+    """Return the plant whose outputs that are no motion have the largest value that its train records hold."""
+    largest: dict[str, float] = {}
+    for signal in (s for r in train for s in r.signals if s.unit in ("N", "N m", "A", "V")):
+        largest[signal.output] = max(largest.get(signal.output, 0.0), float(np.max(np.abs(signal.measured))))
+    outputs = tuple(replace(o, size=largest.get(o.name, 0.0)) for o in plant.outputs)
+    return replace(plant, output="", output_unit="", outputs=outputs) if largest else plant
+
+
+def scaled(plant: Plant, train: Sequence[Record], where: str) -> Plant:
     """Return the plant with the sizes of effort and speed that its train records show, where it asks for that.
 
     Effort = max |gain x drive| of the first input, or the moment of gravity where the drive rests.
-    Speed = max |measured speed|, or of the change of a position over a hundredth of the record. Outputs that are no
-    motion get the largest value that was measured.
+    Speed = max |measured speed|, or of the change of a position over a hundredth of the record.
     """
-    train = [r for r in records if r.role == "train"]
-    largest: dict[str, float] = {}
-    for signal in (s for r in train for s in r.signals if s.unit in ("N", "N m", "A", "V")):
-        name = signal.output or plant.outputs[0].name
-        largest[name] = max(largest.get(name, 0.0), float(np.max(np.abs(signal.measured))))
-    if largest:
-        sized = (replace(o, size=largest.get(o.name, 0.0)) for o in plant.outputs)
-        plant = replace(plant, output="", output_unit="", outputs=tuple(sized))
     if not plant.scales_from_records:
         return plant
     speed = max(map(largest_speed, (one for r in train for one in r.each)))
