@@ -6,6 +6,7 @@ import pandas as pd
 import pytest
 from made_results import PAPER_CASES, MadeResults, made
 
+from armid.report.files import markdown
 from armid.study.analyses.analysis import Evidence
 from armid.study.analyses.convergence import success
 from armid.study.analyses.errors import (
@@ -18,7 +19,11 @@ from armid.study.analyses.errors import (
 )
 from armid.study.analyses.overview import loop_runs, main_table, reasons, runs_table
 from armid.study.document import report_of, summary_of
+from armid.study.results import load_study
+from armid.study.runner import run_study
+from armid.study.tasks import read_study
 from armid.units import angles_in
+from input_texts import TABLE_STUDY
 
 
 def test_the_overview_begins_with_the_paper():
@@ -160,6 +165,21 @@ def test_closed_loops_have_a_row_each_and_a_report_that_counts_verdicts(tmp_path
     failed = MadeResults(closed.runs, closed.parameters, closed.study | {"n_done": 0, "n_failed": 3})
     failed.loops = closed.loops[:0]
     assert report_of(failed).answer[0] == "No campaign was closed."
+
+
+def test_each_budget_is_run_by_itself(tmp_path):
+    text = TABLE_STUDY.replace("seeds = 2", "seeds = 1")
+    line = next(line for line in text.splitlines() if line.startswith("budget = "))
+    (tmp_path / "tiny.toml").write_text(text.replace(line, "budget = [40, 90]"), encoding="utf-8")
+    study = read_study(tmp_path / "tiny.toml")
+    assert [entry.budgets(4) for entry in study.entries] == [[40, 90]] * len(study.entries)
+    run_study(tmp_path / "tiny.toml", jobs=1, out=tmp_path / "out")
+    runs = load_study(tmp_path / "out").runs
+    assert (runs["used"] <= runs["budget"]).all()
+    assert runs.groupby("identifier")["budget"].apply(sorted).map(tuple).unique().tolist() == [(40, 90)]
+    text = markdown(report_of(load_study(tmp_path / "out")))
+    assert "| budget |" in text.replace("**", "")
+    assert ", 40 simulations: " in text
 
 
 def columns_of(results):

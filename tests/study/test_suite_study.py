@@ -85,8 +85,8 @@ def test_what_cannot_be_is_refused(written, replaced, sentence):
 
 def test_what_a_report_needs_of_an_instance_is_that_of_the_first_of_its_problem(written):
     cases = read_study(written()).description()["cases"]
-    told = {case["suite"]: case["difficulty"] for case in cases}
-    assert told == {"arm": "smooth", "arm_shape": "stair", "arm_short": "valley"}
+    difficulties = {case["suite"]: case["difficulty"] for case in cases}
+    assert difficulties == {"arm": "smooth", "arm_shape": "stair", "arm_short": "valley"}
     assert [case["landscape"] for case in cases[::2]] == [case["landscape"] for case in cases[1::2]]
 
 

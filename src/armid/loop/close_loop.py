@@ -167,9 +167,9 @@ def close_loop(
     advice = advice_on(inference, campaign.gyro_range, threads, told) if "cannot_tell_apart" in verdicts else ()
     # Other issues rest on the declared model: they are reported where nothing better was found.
     is_lacking = {"unexplained", "does_not_carry_over", "partly_explained"} & {*verdicts}
-    at_a_loss = is_lacking and not any(s.claimed for s in steps)
+    is_nameless = is_lacking and not any(s.claimed for s in steps)
     told_first = dict.fromkeys(s.sentence for s in (*issues, *given_twice(campaign.records))
-                               if s.kind in TOLD or (at_a_loss and s.kind != "unjudged"))  # fmt: skip
+                               if s.kind in TOLD or (is_nameless and s.kind != "unjudged"))  # fmt: skip
     again = [f"Record {s.record} once more, or look at how it was made." for s in suspects if s.kind != "trend"]
     doubt = [] if after.fails_to_carry_over else in_doubt_sentences(after.train, after.holdout)
     next_steps = (*told_first, *missed_sentences(after.missed), *doubt, *limits_of(after), *dict.fromkeys(again))
