@@ -105,6 +105,7 @@ def test_a_parameter_among_the_constants_is_refused_with_the_key_to_write(run, r
     ("time_s,drive_V\n0,1\n1,2\n", "a speed or an angle"), ("time_s,speed\n0,1\n1,2\n", "an input"),
     ("speed,drive\n1,1\n1,2\n", "no column of"), ("time_s,angle_counts,drive_V\n0,1,2\n1,2,3\n", "in counts"),
     ("time_s,position_m,drive_N\n0,1,2\n1,2,3\n", "a position of a linear axis"),
+    ("time_s,speed_rad_s,drive_V\n0,1,2\n", "a.csv: 1 samples in the record, at least 20 are expected"),
     ("time_s,angle_deg,velocity_m_s,drive_N_m\n0,1,2,3\n1,2,3,4\n", "moves straight and 'angle_deg' of one that turns"),
 ])  # fmt: skip
 def test_files_that_say_too_little_are_refused(refused, tmp_path, text, words):

@@ -25,6 +25,7 @@ from armid.model import Array, Plant
 from armid.model.effect import RESERVED_WORDS
 from armid.model.parameter import check_name
 from armid.record.reader import wraps_at
+from armid.record.resample import check_number
 from armid.record.sensor import FEWEST_REST_SAMPLES, sensor_of, stands_still
 from armid.record.table import CsvTable, missing, read_table
 from armid.registry import load_registry
@@ -297,6 +298,8 @@ def guessed_campaign(
     notes += [f"not used: {', '.join(map(quoted, unused))}"] if unused else []
     if any(column_of(h).end in COUNT_ENDS for h in unused):
         notes.append("counts of an encoder are an angle as angle_counts, with counts_per_turn in this file")
+    for table in tables:
+        check_number(len(table.lines), f"{table.file}:", "in the record")
     # what the plant says of an input counts, whatever the file says
     known = {i.name for i in plant.inputs if i.hold} if plant is not None else set[str]()
     open_drives = [headers[i] for i in inputs if i not in known]
