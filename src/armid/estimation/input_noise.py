@@ -142,14 +142,17 @@ def pooled_noise(records: Sequence[Record]) -> dict[str, InputNoise]:
 def estimated(record: Record, noise: Mapping[str, InputNoise]) -> Record:
     """Return a record with the best estimates of its measured inputs; itself where it holds them."""
 
-    def driven(piece: Piece) -> Piece:
+    def with_estimates(piece: Piece) -> Piece:
         if piece.smoothed:
             return piece
         inputs = {name: piece.manoeuvre.inputs[name] for name in noise}
         found = {name: smoothed(u, noise[name], at_rest(record, piece, u)) for name, u in inputs.items()}
-        return replace(piece, smoothed=found).with_inputs({name: one.values for name, one in found.items()})
+        # a fit of the start would take up what such noise does
+        still = piece.correction and replace(piece.correction, gain=0.0 * piece.correction.gain)
+        driven = replace(piece, smoothed=found, correction=still)
+        return driven.with_inputs({name: one.values for name, one in found.items()})
 
-    return record.with_pieces(driven)
+    return record.with_pieces(with_estimates)
 
 
 def answers(

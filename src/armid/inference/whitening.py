@@ -216,8 +216,8 @@ def with_answers(
 ) -> WhitenedData:  # fmt: skip
     """Return data whose noise holds what noise of the inputs does at a candidate, to first order.
 
-    Starts are part of it as well where they are fitted: they are fitted as if what a model leaves was white, and would
-    take up what such noise does later in a record. replays: of these records. candidate: whole, SI, (n_parameters,).
+    Starts that the reader saw are part of it as well: fitted as if what a model leaves was white, they would take up
+    what such noise does later in a record. replays: of these records. candidate: whole, SI, (n_parameters,).
     """
     levels, places = dict(zip(replays, data.levels, strict=True)), dict(zip(replays, data.edges, strict=False))
     blocks = {int(block.at[0]): block for block in data.blocks}

@@ -198,10 +198,19 @@ class Start:
         return np.asarray(both[:, :-1]), np.asarray(both[:, -1])
 
     def fitted(self, candidate: Array) -> Piece:
-        """Return the piece from the best start of a candidate, as it is where the candidate diverges."""
+        """Return the piece from the best start of a candidate, as it is where the candidate diverges.
+
+        Where noise of the inputs counts, the doubt about the start is part of it (`whitening.with_answers`): the piece
+        starts where the candidate's outputs show what the reader saw, and no start is fitted.
+        """
         constants, population = self.constants, candidate[np.newaxis]
         signals, slopes = self.linear(constants, population)
         start = replace(self, off=self.off_by(signals[:, 0, 0]))
+        if self.piece.smoothed:
+            constants = start.shown[0]
+            slopes = self.linear(constants, population)[1]
+            gain, offset = np.zeros((len(constants), self.weights.size)), np.zeros(len(constants))
+            return self.corrected(constants, slopes, gain, offset) if np.isfinite(slopes).all() else self.piece
         for _ in range(MOST_OF_START):
             residual, seen = start.residual(signals)[0], start.seen_slopes(slopes)[:, 0]
             if not (np.isfinite(residual).all() and np.isfinite(seen).all()):
@@ -221,8 +230,12 @@ class Start:
         if not np.isfinite(slopes).all():
             return self.piece
         gain, offset = start.answer(constants, start.seen_slopes(slopes)[:, 0], misfit)
-        correction = StartCorrection(start.places, slopes[:, :, 0], gain * start.weights, offset, start.measured,
-                                     start.samples)  # fmt: skip
+        return self.corrected(constants, slopes, gain, offset)
+
+    def corrected(self, constants: Array, slopes: Array, gain: Array, offset: Array) -> Piece:
+        """Return the piece from one start, with how far others move it from there; gain: of samples over the noise."""
+        correction = StartCorrection(self.places, slopes[:, :, 0], gain * self.weights, offset, self.measured,
+                                     self.samples)  # fmt: skip
         known = dict(zip(self.names, map(float, constants), strict=True))
         return replace(self.piece.with_constants(known), correction=correction)
 
