@@ -10,7 +10,7 @@ import numpy as np
 from armid.estimation.design import range_of
 from armid.model import Array, Manoeuvre, ManoeuvreKey, Plant
 from armid.record import Piece, Record, Signal
-from armid.record.start import Track, state_shown
+from armid.record.start import state_shown, track_of
 
 IN_DEGREES = 180.0 / np.pi
 # Units in which a mistake can be made that is one of angles and turning speeds, of turning speeds, of any signal.
@@ -215,7 +215,7 @@ def start_of(record: Record, piece: Piece, plant: Plant, factor: float) -> dict[
     if not piece.start_deviation:
         return {}
     given = {n: v for n, v in old.items() if n not in piece.start_deviation}
-    tracks = {one.output: Track(one.measured, one.noise.rms) for one in record.signals}
+    tracks = {one.output: track_of(one) for one in record.signals}
     inputs = list(piece.manoeuvre.inputs.values())
     return state_shown(plant, given, tracks, piece.manoeuvre.interval, piece.start_index, inputs)[0]
 

@@ -96,7 +96,8 @@ def record_of(table: CsvTable, sheet: RecordSheet, campaign: CampaignSheet, plan
     inputs = {i.name: onto_grid(driven[i.name], times, timing, i.hold or hold) if i.name in driven
               else np.full(timing.n_samples, i.default) for i in plant.inputs}  # fmt: skip
     constants = record_constants(plant, campaign.constants, sheet, where)
-    noises = {name: noise_of_input(u, [(y, s.is_speed) for s, y in measured]) for name, u in driven.items()}
+    noises = {name: noise_of_input(u, [(y, s.is_speed) for s, y in measured]).on_finer_grid(timing.finer)
+              for name, u in driven.items()}  # fmt: skip
     record = Record(
         file=sheet.file,
         role=sheet.role,
@@ -226,7 +227,7 @@ def check_lost(table: CsvTable, header: str, faults: Sequence[Broken], n_new: in
 
 def gaps(times: Array, timing: Timing) -> list[Broken]:
     """Return the gaps between rows that are bridged by two samples of the grid or more."""
-    at = timing.grid()[in_runs(gap_samples(times, timing), BRIDGED)]
+    at = timing.grid()[in_runs(gap_samples(times, timing), BRIDGED * timing.finer)]
     return [Broken("gap", at.size, float(at[0]), float(at[-1]))] if at.size else []
 
 

@@ -20,6 +20,9 @@ EVEN_TIMES = 1e-3
 LARGE_GAP = 3.0
 # A row this near to a grid sample, in intervals, is that sample.
 NEAR_SAMPLE = 0.75
+# Rows are off a grid by so much of an interval at most, rms, where at most so many samples for a row get them there:
+# what drives the machine may change at each row.
+OFF_GRID, MOST_FOR_A_ROW = 0.08, 4
 NEIGHBOURS = 7
 
 
@@ -32,7 +35,8 @@ class Timing:
     """How the samples of a file come onto an even grid.
 
     first: row of the first sample at or after the start. earliest: first sample of the grid that was measured and is
-    not before t = 0. resampled: False when the rows from `first` on are the samples of the grid.
+    not before t = 0. resampled: False when the rows from `first` on are the samples of the grid. finer: samples of the
+    grid for a row; most of them were not measured.
     """
 
     start: float
@@ -42,6 +46,7 @@ class Timing:
     earliest: int
     resampled: bool
     irregularity: Irregularity | None
+    finer: int = 1
 
     def grid(self) -> Array:
         return self.start + self.interval * np.arange(self.n_samples, dtype=np.float64)
@@ -51,7 +56,8 @@ def timing_of(times: Array, from_rest: bool, file: str) -> Timing:
     """Find the even grid of a record.
 
     from_rest: the grid begins at t = 0 exactly (samples before are rest), else at the first sample. The interval is the
-    slope of the times where they are even but for rounding and jitter, else the median interval, with a warning.
+    slope of the times where they are even but for rounding and jitter, else the median interval, with a warning. Where
+    the rows are too far off such a grid it is a finer one.
     """
     first = 0
     if from_rest:
@@ -66,7 +72,9 @@ def timing_of(times: Array, from_rest: bool, file: str) -> Timing:
         raise ArmidError(f"{file}: the first sample is at {begin:.6g} s, but the arm starts at t = 0: a first sample "
                          "at or before 0 is expected")  # fmt: skip
     resampled = not even or abs(begin - start) > tolerance
-    n_samples = grid_size(motion, start, interval, file) if resampled else motion.size
+    finer = 1 if even else fineness(motion, start, interval)
+    interval /= finer
+    n_samples = grid_size(motion, start, interval, finer, file) if resampled else motion.size
     check_number(n_samples, f"{file}:", place)
     # a plant from rest may have lost its sample at t = 0; an axis may begin before 0, and what is before 0 never counts
     earliest = 0 if from_rest and first > 0 else int(np.ceil((max(begin, 0.0) - start) / interval - EVEN_TIMES))
@@ -77,7 +85,17 @@ def timing_of(times: Array, from_rest: bool, file: str) -> Timing:
                    f"the largest is {widest:.3g} times the median, at t = {irregularity.at_s:.6g} s")  # fmt: skip
         message += ", a large gap that is bridged by a straight line" if widest > LARGE_GAP else ""
         warnings.warn(f"{message}; resampled evenly at {interval:.6g} s", IrregularSamplingWarning, stacklevel=2)
-    return Timing(start, interval, n_samples, first, max(earliest, 0), resampled, irregularity)
+    return Timing(start, interval, n_samples, first, max(earliest, 0), resampled, irregularity, finer)
+
+
+def fineness(times: Array, start: float, interval: float) -> int:
+    """Return how many samples for a row a grid needs to hold uneven times, 4 where none does."""
+
+    def off(parts: int) -> float:
+        places = (times - start) / interval * parts
+        return float(np.sqrt(np.mean((places - np.rint(places)) ** 2))) / parts
+
+    return next((n for n in range(1, MOST_FOR_A_ROW) if off(n) <= OFF_GRID), MOST_FOR_A_ROW)
 
 
 def check_number(n_samples: int, where: str, which: str) -> None:
@@ -130,11 +148,11 @@ def irregularity_of(times: Array) -> Irregularity | None:
     return Irregularity(float(np.mean(np.abs(relative - 1) > 0.01)), float(relative[widest]), float(times[widest]))
 
 
-def grid_size(times: Array, start: float, interval: float, file: str) -> int:
+def grid_size(times: Array, start: float, interval: float, finer: int, file: str) -> int:
     """Return the number of grid samples, the last at most half an interval off; refuse a grid that is mostly gaps."""
     length = float(times[-1]) - start
     size = length / interval
-    if size > MOST_FILLING * times.size:
+    if size > MOST_FILLING * finer * times.size:
         raise ArmidError(f"{file}: {times.size} samples at a median interval of {interval:.3g} s leave most of "
                          f"{length:.6g} s unmeasured, a record without such gaps is expected")  # fmt: skip
     return int(size + 0.5) + 1
@@ -144,8 +162,8 @@ def onto_grid(values: Array, times: Array, timing: Timing, hold: str = "linear")
     """Return a column on the even grid, (n_samples,), from values and times, both (n_rows,).
 
     `hold` "linear" interpolates between rows, which never overshoots at the kinks of a record. With "zero" the column
-    keeps each value until the next row; a grid sample is its mean over the interval that follows, so that no impulse
-    comes late.
+    keeps each value until the next row; a grid sample is its mean over the interval that follows. Where the value
+    changes within an interval, a part of that goes to the sample after it, so that no impulse comes late or early.
     """
     if not timing.resampled:
         return np.ascontiguousarray(values[timing.first :])
@@ -154,18 +172,22 @@ def onto_grid(values: Array, times: Array, timing: Timing, hold: str = "linear")
         return np.asarray(np.interp(grid, times, values), dtype=np.float64)
     # a sample counts from a thousandth of an interval before its time on, so that rounding does not delay it
     edges = np.append(grid, grid[-1] + timing.interval) + EVEN_TIMES * timing.interval
-    rows = np.maximum(np.searchsorted(times, edges, side="right") - 1, 0)
-    first, last = rows[:-1], rows[1:]
-    impulse = np.append(0.0, np.cumsum(values[:-1] * np.diff(times)))
-    at_edges = impulse[rows] + values[rows] * (edges - times[rows])
-    changes = np.append(0, np.cumsum(np.diff(values) != 0))
-    return np.where(changes[first] == changes[last], values[first], np.diff(at_edges) / timing.interval)
+    points = np.union1d(edges, times[(times > edges[0]) & (times < edges[-1])])
+    middles, lengths = 0.5 * (points[1:] + points[:-1]), np.diff(points)
+    held = values[np.maximum(np.searchsorted(times, middles, side="right") - 1, 0)]
+    own = np.searchsorted(edges, middles) - 1
+    mean = np.bincount(own, held * lengths) / timing.interval
+    off_centre = held * lengths * (middles - 0.5 * (edges[own] + edges[own + 1]))
+    # rounding is no change
+    changed = np.bincount(own, held != held[np.searchsorted(own, own)]) > 0
+    late = np.where(changed, np.bincount(own, off_centre) / timing.interval**2, 0.0)
+    return np.where(changed, mean, held[np.searchsorted(own, np.arange(grid.size))]) - late + np.append(0.0, late[:-1])
 
 
 def moved_onto_grid(values: Array, times: Array, timing: Timing, rows: Mask) -> tuple[Array, Mask]:
     """Return a noisy column on the even grid and which of its samples were measured, both (n_samples,).
 
-    Each grid sample takes the nearest row, moved along the slope of a parabola through 7 neighbours: the noise stays
+    Each grid sample takes the nearest row, moved along a parabola through 7 neighbours: the noise stays
     that of one sample and white, where a line between two rows would take a third off its variance and correlate
     neighbours. Where no row of data is near, a straight line runs between those around.
     values, times, rows (which are data): (n_rows,).
@@ -176,11 +198,15 @@ def moved_onto_grid(values: Array, times: Array, timing: Timing, rows: Mask) -> 
     grid = timing.grid()
     right, nearest = around(times, grid)
     along = grid - times[nearest]
-    data = rows[nearest] & (np.abs(along) <= NEAR_SAMPLE * timing.interval)
+    # of a finer grid no two samples are one row
+    near = NEAR_SAMPLE if timing.finer == 1 else 0.5
+    data = rows[nearest] & (np.abs(along) <= near * timing.interval)
     if times.size < NEIGHBOURS:
         return onto_grid(known, times, timing), data
-    moved = known[nearest] + parabola_slopes(known, times, nearest) * along
-    gap = np.maximum(np.abs(along), times[right] - times[right - 1] - timing.interval) > NEAR_SAMPLE * timing.interval
+    slope, bend = parabolas(known, times, nearest)
+    moved = known[nearest] + (slope + bend * along) * along
+    widest = NEAR_SAMPLE * timing.finer * timing.interval
+    gap = np.maximum(np.abs(along), times[right] - times[right - 1] - timing.finer * timing.interval) > widest
     return np.where(gap, np.interp(grid, times, known), moved), data
 
 
@@ -189,7 +215,7 @@ def gap_samples(times: Array, timing: Timing) -> Mask:
     if not timing.resampled:
         return np.zeros(timing.n_samples, dtype=np.bool_)
     grid = timing.grid()
-    return np.asarray(np.abs(grid - times[around(times, grid)[1]]) > NEAR_SAMPLE * timing.interval)
+    return np.asarray(np.abs(grid - times[around(times, grid)[1]]) > NEAR_SAMPLE * timing.finer * timing.interval)
 
 
 def around(times: Array, grid: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -198,8 +224,8 @@ def around(times: Array, grid: Array) -> tuple[NDArray[np.intp], NDArray[np.intp
     return right, np.where(grid - times[right - 1] < times[right] - grid, right - 1, right)
 
 
-def parabola_slopes(values: Array, times: Array, rows: NDArray[np.int64]) -> Array:
-    """Return the slope at each row of the least-squares parabola through 7 neighbours, at the ends on one side."""
+def parabolas(values: Array, times: Array, rows: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Return slope and half the curvature at each row of the parabola through 7 neighbours, at the ends on one side."""
     n, unit = NEIGHBOURS, float(np.median(np.diff(times)))
     near = np.clip(rows - n // 2, 0, times.size - n) + np.arange(n)[:, np.newaxis]
     middle = np.sum(times[near], axis=0) / n
@@ -210,7 +236,7 @@ def parabola_slopes(values: Array, times: Array, rows: NDArray[np.int64]) -> Arr
     share = second * bend - third**2
     own = (times[rows] - middle) / unit
     b, c = (bend * straight - third * curved) / share, (second * curved - third * straight) / share
-    return np.asarray((b + 2.0 * c * own) / unit)
+    return np.asarray((b + 2.0 * c * own) / unit), np.asarray(c / unit**2)
 
 
 # Samples by which a window may miss one and still hold it.

@@ -6,7 +6,7 @@ two rows makes values that no sensor gave.
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, comb
 
 import numpy as np
@@ -202,6 +202,13 @@ class InputNoise:
 
     rms: float = 0.0
     step: float = 0.0
+
+    def on_finer_grid(self, finer: int) -> "InputNoise":
+        """Return the noise of samples, so many for a row, whose slow changes are as large as those of the rows."""
+        if finer == 1:
+            return self
+        rounding = self.step**2 / 12.0
+        return replace(self, rms=float(np.sqrt(finer * (self.rms**2 + rounding) - rounding)))
 
 
 def noise_of_input(values: Array, outputs: Sequence[tuple[Array, bool]]) -> InputNoise:

@@ -22,24 +22,34 @@ STEPS, TINY = 4, 1e-6
 class Track:
     """Hold a signal from which a start is taken, SI, on the grid.
 
-    noise: deviation of one sample, larger by the root of the samples for each that was measured. step: of the sensor,
-    0 for a fine one.
+    noise: deviation of one sample. step: of the sensor, 0 for a fine one. every: samples of the grid for each that was
+    measured, where this is so all along; the others hold straight lines between these.
     """
 
     values: Array
     noise: float
     step: float = 0.0
+    every: int = 1
+
+    def smoothed(self, index: int, slope: bool = False, still: int = 0) -> tuple[float, float]:
+        """Return the value at a sample of the grid, or its change from sample to sample, as `smoothed` does."""
+        values = self.values[index % self.every :: self.every]
+        value, deviation = smoothed(values, index // self.every, self.noise, slope, still // self.every)
+        return (value / self.every, deviation / self.every) if slope else (value, deviation)
 
 
 def track_of(signal: Signal) -> Track:
     """Return a signal with the noise of the start that it tells."""
     measured = 1.0 if signal.data is None else float(np.mean(signal.data))
-    return Track(signal.measured, signal.noise.rms / float(np.sqrt(measured)), signal.sensor.step)
+    every = int(1.0 / measured)
+    # lost samples leave fewer to tell it
+    noise = signal.noise.rms / float(np.sqrt(every * measured))
+    return Track(signal.measured, noise, signal.sensor.step, every)
 
 
 def state_at(tracks: Mapping[str, Track], index: int) -> State:
     """Return constants (`start_position`, `start_speed`) and their standard deviations (SI) at one sample."""
-    estimates = {name: smoothed(t.values, index, t.noise) for name, t in tracks.items()}
+    estimates = {name: t.smoothed(index) for name, t in tracks.items()}
     deviations = {name: float(max(d, tracks[name].step / np.sqrt(12.0))) for name, (_, d) in estimates.items()}
     return {name: value for name, (value, _) in estimates.items()}, deviations
 
@@ -66,12 +76,14 @@ def state_shown(
     units = {c.name: c.unit for c in plant.constants}
     sizes = np.array([plant.scales.effort if units[n] in ("N", "N m") else plant.scales.speed for n in names])
     values, rates = [], []
-    still = n_still(inputs)
+    every = min((t.every for t in tracks.values()), default=1)
+    # noise of an input is white from row to row alone
+    still = every * n_still([u[::every] for u in inputs])
     for output in (o for o in plant.outputs if o.name in tracks):
         track, floor = tracks[output.name], 1e-9 * plant.scales.speed
-        value, deviation = smoothed(track.values, index, track.noise, still=still)
+        value, deviation = track.smoothed(index, still=still)
         values.append((value, max(deviation, track.step / np.sqrt(12.0), floor), output.signal))
-        slope, deviation = smoothed(track.values, index, track.noise, slope=True, still=still)
+        slope, deviation = track.smoothed(index, slope=True, still=still)
         rates.append((slope / interval, max(deviation / interval, floor), output.signal))
     shown = [(v, d, key, outputs.value) for v, d, key in values if outputs.shows(key)]
     shown += [(v, d, key, outputs.rate) for v, d, key in rates if outputs.shows_rate(key)]
