@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from math import comb
 from pathlib import Path
 from typing import Any
@@ -294,7 +294,9 @@ def prepared(
     library = replace(library, reach=REACH_OF_STRENGTHS, priors=chances, known=known)
     problem = library.problem(())
     library = library.about(with_fitted_starts(problem.replays, problem.space))
-    library, declared = with_input_noise(*with_noise(*with_scales(library)))
+    exact, declared = with_noise(*with_scales(library))
+    library = with_input_noise(exact, declared)
+    declared = declared if library is exact else declared_again(library, declared)
     library = replace(library, doubles=doubles(declared, library), least_waves=least_waves(declared), _problems={})
     return library, declared
 
@@ -310,8 +312,21 @@ def infer(library: Library, declared: Fit) -> Inference:
 
 
 def inferred(library: Library, declared: Fit, changes: Sequence[ChangeOfNoise]) -> Inference:
-    """Return an inference, with the first of some changes of the noise that it asks for, and those after it."""
-    exploration = explore(library, declared)
+    """Return an inference, with the first of some changes of the noise that it asks for, and those after it.
+
+    Noise of the inputs counts from the first leading model on that may show it: what it does looks like many effects.
+    """
+    noisy = library
+
+    @cache
+    def inputs_act(fit: Fit) -> bool:
+        nonlocal noisy
+        noisy = with_input_noise(library, fit) if with_exact_inputs in changes else library
+        return noisy is not library
+
+    exploration = explore(library, declared, inputs_act)
+    if noisy is not library:
+        return inferred(noisy, declared_again(noisy, declared), changes)
     inference = Inference(exploration, posterior(exploration))
     for change in changes:
         other = change(library, inference)
@@ -475,15 +490,15 @@ def with_noise_in_motion(library: Library, inference: Inference) -> Library:
     return noisy
 
 
-def with_input_noise(library: Library, declared: Fit) -> tuple[Library, Fit]:
-    """Return the library whose inputs count as measured with noise, where this may show, and the declared fit."""
-    if not pooled_noise(library.data.records) or not is_significant(declared):
-        return library, declared
-    with_noise = with_measured_inputs(library, declared)
-    if not matters(with_noise, declared):
-        return library, declared
+def with_input_noise(library: Library, fit: Fit) -> Library:
+    """Return the library whose inputs count as measured with noise, where what a fit leaves may show it."""
+    if library.as_read is not None or not pooled_noise(library.data.records) or not is_significant(fit):
+        return library
+    with_noise = with_measured_inputs(library, fit)
+    if not matters(with_noise, fit):
+        return library
     library.say("taking the measured inputs as measured with noise")
-    return with_noise, declared_again(with_noise, declared)
+    return with_noise
 
 
 def with_measured_inputs(library: Library, fit: Fit) -> Library:

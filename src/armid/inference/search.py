@@ -5,7 +5,7 @@ of the best are not expanded. Leading forecasts are then fitted, because a forec
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from weakref import WeakKeyDictionary
@@ -62,17 +62,22 @@ N_RIVALS = 3
 BEAM = 3
 
 
-def explore(library: Library, declared: Fit, most: int | None = None) -> Exploration:
+def explore(
+    library: Library, declared: Fit, until: Callable[[Fit], bool] = lambda _: False, most: int | None = None
+) -> Exploration:
     """Return the models that were explored from the declared one.
 
-    declared: its fit. most: models that are expanded, None: as many as the samples allow.
+    declared: its fit. until: whether a fit that leads, after an expansion, is reason to stop at once. most: models that
+    are expanded, None: as many as the samples allow.
     """
     exploration = begun(library, declared)
     expand_all(exploration, 1)
     if not is_near(exploration):
         take_from_short_pieces(exploration)
-    if expand_all(exploration, most) and add_unknown(exploration):
-        expand_all(exploration, most)
+    if expand_all(exploration, most, until) and add_unknown(exploration):
+        expand_all(exploration, most, until)
+    if until(exploration.fits[exploration.ranked()[0][0]]):
+        return exploration
     add_unknown(exploration)
     finish_all(exploration)
     for _ in range(MOST_ENDS):
@@ -98,15 +103,17 @@ def begun(library: Library, declared: Fit) -> Exploration:
     return exploration
 
 
-def expand_all(exploration: Exploration, most: int | None) -> bool:
+def expand_all(exploration: Exploration, most: int | None, until: Callable[[Fit], bool] = lambda _: False) -> bool:
     """Expand models while one that may be right is not expanded; tell whether none is left.
 
-    most: models that are expanded in all, None: as many as the samples allow.
+    most: models that are expanded in all, None: as many as the samples allow. until: see `explore`.
     """
     cost = len(exploration.declared.residual) / SAMPLES * (1.0 + len(exploration.constants) / USUAL_CONSTANTS)
     most = most or int(np.clip(MOST_EXPANDED / cost, FEWEST_EXPANDED, MOST_EXPANDED))
     while exploration.n_expanded < most and exploration.in_vain < MOST_IN_VAIN:
         model, best = next_model(exploration), exploration.ranked()[0][0]
+        if until(exploration.fits[best]):
+            return False
         if model is None:
             return True
         complete(exploration, model)

@@ -178,7 +178,7 @@ def onto_grid(values: Array, times: Array, timing: Timing, hold: str = "linear")
     own = np.searchsorted(edges, middles) - 1
     mean = np.bincount(own, held * lengths) / timing.interval
     off_centre = held * lengths * (middles - 0.5 * (edges[own] + edges[own + 1]))
-    # rounding is no change
+    # what an interval sees of one value is that value to the last digit
     changed = np.bincount(own, held != held[np.searchsorted(own, own)]) > 0
     late = np.where(changed, np.bincount(own, off_centre) / timing.interval**2, 0.0)
     return np.where(changed, mean, held[np.searchsorted(own, np.arange(grid.size))]) - late + np.append(0.0, late[:-1])
