@@ -17,6 +17,7 @@ from armid.engine import Calibration, Schedule, probes
 from armid.estimation.corrections import WIDER_BOUNDS, Correction, DataIssue, corrections, of_pieces, rms
 from armid.estimation.least_squares import WeightedRecords, descend
 from armid.model import Array, Manoeuvre, Model, Plant
+from armid.model.parameter import powers_of
 from armid.problem.problem import ReadyRecord
 from armid.problem.space import Space, space_of
 from armid.record import Campaign, Piece, Record
@@ -56,6 +57,8 @@ SAME_ERROR = 0.01
 LEAST_SHIFT, MOST_SHIFT = 3, 0.3
 # Integration steps between samples, relative fall of squares at which a rough fit has arrived.
 SUBSTEPS_CHECKED, CHECK_TOLERANCE = 4, 1e-3
+# How much wider a range becomes that is a multiple of the machine's scales, and that may be too narrow.
+WIDER_RANGE = 8.0
 # Longest sample interval of a motion that a motor drives [s].
 LONGEST_INTERVAL = 1.0
 # A record begins elsewhere than the model where each of so many first samples is more than so many times the noise, and
@@ -234,6 +237,13 @@ def mistakes(trial: DataTrial, train: Sequence[Record]) -> tuple[list[DataIssue]
     if not all(np.array_equal(getattr(declared, n), getattr(trial.space, n), True) for n in ("low", "high", "fixed")):
         own = DataTrial(trial.model, declared)
         tried.append((*own.fit(train), WIDER_BOUNDS, own, tuple(train)))
+    if trial.model.plant.scales_from_records:
+        own = DataTrial(trial.model, with_wider_ranges(trial.model, trial.space))
+        start, error = own.fit(train)
+        outside = names_outside(trial.space, own.problem(train).values(start))
+        if outside:
+            words = f"{', '.join(outside)} may lie outside the range that was searched: with one eight times as wide"
+            tried.append((start, error, Correction("bounds", np.nan, words, lambda record: record), own, tuple(train)))
     # a poor fit of the declared model is not a mistake of the records, and of two corrections the better one is named
     likely = sorted(tried, key=lambda t: t[1])[:N_LIKELY]
     starts = [z, *(t[0] for t in likely)]
@@ -258,6 +268,23 @@ def mistakes(trial: DataTrial, train: Sequence[Record]) -> tuple[list[DataIssue]
                             "that was tried does.") for r, e in zip(train, errors, strict=True)
                   if NOTHING_GAINED < e < np.inf and trial.likeness(r) < UNLIKE]  # fmt: skip
     return issues or everywhere, z
+
+
+def with_wider_ranges(model: Model, space: Space) -> Space:
+    """Return the space with wider ranges where they are multiples of the machine's scales: a size to expect."""
+    sized = [p.name for p in model.plant.parameters if powers_of(p.unit)]
+    sized += [f"{e.name}.{p.name}" for e in model.effects for p in e.parameters if p.null == 0.0 and powers_of(p.unit)]
+    for name in set(sized) & set(space.free_names):
+        low, high = float(space.low[space.index(name)]), float(space.high[space.index(name)])
+        space = space.with_bounds(name, low * WIDER_RANGE ** -np.sign(low), high * WIDER_RANGE)
+    return space
+
+
+def names_outside(space: Space, values: Array) -> list[str]:
+    """Return the free parameters whose values are outside of a space."""
+    low, high = space.low[space.free], space.high[space.free]
+    outside = (values < low) | (values > high)
+    return [name for name, is_outside in zip(space.free_names, outside, strict=True) if is_outside]
 
 
 def of_few(trial: DataTrial, train: Sequence[Record], before: float, below: float) -> list[DataIssue]:
@@ -348,14 +375,18 @@ def least_nearby(trial: DataTrial, train: Sequence[Record], record: Record, z: A
 
 
 def chosen(record: str, before: float, tried: Iterable[tuple[float, Correction]]) -> list[DataIssue]:
-    """Return the correction that leaves least, and those that do as well; none unless it takes most of the error."""
+    """Return the correction that leaves least, and those that do as well; none unless it takes most of the error.
+
+    Of those that do as well, one that accuses no record comes first.
+    """
     most = min(CORRECTED * before, LEFT)
     good = [(e, m) for e, m in tried if e <= (min(most, LEFT_BY_TWO) if m.factor in (0.5, 2.0) else most)]
-    good.sort(key=lambda pair: pair[0])
     if not good:
         return []
+    least = min(e for e, _ in good)
+    good.sort(key=lambda pair: (pair[0] > AS_GOOD * least, pair[1].kind != "bounds", pair[0]))
     first = good[0][1].issue(record, before, good[0][0])
-    equal = [m.words for e, m in good[1:3] if e <= AS_GOOD * good[0][0]]
+    equal = [m.words for e, m in good[1:3] if e <= AS_GOOD * least]
     also = f" As well explained by: {'; or '.join(equal)}." if equal else ""
     return [replace(first, sentence=f"{first.sentence}{also}")]
 

@@ -13,6 +13,7 @@ from armid.engine import along
 from armid.errors import ArmidError, nearest
 from armid.estimation.constants import NAMED
 from armid.estimation.corrections import rms
+from armid.estimation.data_checks import WIDER_RANGE
 from armid.estimation.information import NORMAL_95
 from armid.estimation.input_noise import estimated, pooled_noise
 from armid.estimation.least_squares import Estimates, descend, held_by_bound, spread_starts, with_fitted_starts
@@ -43,8 +44,8 @@ ChangeOfNoise = Callable[[Library, "Inference"], Library]
 REACH_OF_STRENGTHS = 16.0
 # A declared effort within this factor of the largest one at the declared fit stays: a scale is an order of magnitude.
 SAME_ORDER = 2.0
-# How much wider a range becomes whose end holds a strength, and how often.
-WIDER_RANGE, MOST_WIDENED = 8.0, 4
+# How often a range becomes wider whose end holds a parameter.
+MOST_WIDENED = 4
 # Share of what a model leaves, below which noise of the inputs is a trifle: a thousandth of its square. What ends near
 # it is judged again with that noise.
 TRIFLE = 0.03
@@ -432,22 +433,22 @@ def with_scales(library: Library) -> tuple[Library, Fit]:
     """Return the library with the sizes that the declared fit shows, and that fit.
 
     The drive's column is in volts or a duty where the gain is a free parameter: the scale of effort is the largest
-    effort of the drive at the declared fit. A strength of the declared model that sits at the end of its
+    effort of the drive at the declared fit. A parameter of the declared model that sits at the end of its
     declared range, which is a multiple of the machine's scales, gets a wider one; a range that the user gave stays.
     """
+    of_machine = library.scaled_strengths | library.scaled_by_plant
     fit = declared_fit(library)
     scaled = rescaled(library, fit)
     if scaled is not library:
         library, fit = scaled, declared_fit(scaled)
     for _ in range(MOST_WIDENED):
         held = set(np.array(list(fit.values))[held_by_bound(fit.records.space, fit.x)].tolist())
-        own = {n for n in held & library.scaled_strengths if library.owner(n) is None
-               and abs(fit.values[n]) > 0.0}  # fmt: skip
+        own = {n for n in held & of_machine if library.owner(n) is None and abs(fit.values[n]) > 0.0}
         if not own:
             break
         space = fit.records.space
         ends = {n: (float(space.low[space.index(n)]), float(space.high[space.index(n)])) for n in own}
-        wider = {n: (WIDER_RANGE * low, WIDER_RANGE * high) for n, (low, high) in ends.items()}
+        wider = {n: (low * WIDER_RANGE ** -np.sign(low), high * WIDER_RANGE) for n, (low, high) in ends.items()}
         library = replace(library, widened={**library.widened, **wider}, _problems={})
         fit = declared_fit(library)
     return library, fit

@@ -254,6 +254,12 @@ class Library:
                  if p.null == 0.0 and p.fixed is None and (powers_of(p.unit) or name.startswith(ERROR_OF)))  # fmt: skip
         return frozenset(names) - {*self.bounds, *self.fixed, *self.overrides}
 
+    @cached_property
+    def scaled_by_plant(self) -> frozenset[str]:
+        """Names of parameters of the plant in units of its scales, whose range the user did not give."""
+        names = (p.name for p in self.declared.plant.parameters if p.fixed is None and powers_of(p.unit))
+        return frozenset(names) - {*self.bounds, *self.fixed, *self.overrides}
+
     def log_odds(self, effect: str, default: float) -> float:
         """Return the log prior odds of an effect: what the user knows of it, else the default."""
         given = self.priors.get(effect)

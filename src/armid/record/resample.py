@@ -181,7 +181,8 @@ def onto_grid(values: Array, times: Array, timing: Timing, hold: str = "linear")
     # what an interval sees of one value is that value to the last digit
     changed = np.bincount(own, held != held[np.searchsorted(own, own)]) > 0
     late = np.where(changed, np.bincount(own, off_centre) / timing.interval**2, 0.0)
-    return np.where(changed, mean, held[np.searchsorted(own, np.arange(grid.size))]) - late + np.append(0.0, late[:-1])
+    own_value = held[np.searchsorted(own, np.arange(grid.size))]
+    return np.asarray(np.where(changed, mean, own_value) - late + np.append(0.0, late[:-1]))
 
 
 def moved_onto_grid(values: Array, times: Array, timing: Timing, rows: Mask) -> tuple[Array, Mask]:
