@@ -10,6 +10,7 @@ from made_machines import write_arm, write_axis, write_link
 from test_data_checks import accusations, change, pendulum, rewritten, said_of
 
 from armid.estimation.data_checks import data_issues
+from armid.inference.infer import prepared
 from armid.model import PLANTS, Model
 from armid.problem.space import space_of
 from armid.record import read_campaign
@@ -95,3 +96,19 @@ def test_records_that_all_begin_elsewhere_than_the_model_are_told(tmp_path, begi
     else:
         (sentence,) = said
         assert re.match(r"angle: every train record begins -11\.\d to -11\.\d deg away from where rotary_arm", sentence)
+
+
+def test_a_range_of_the_plant_that_is_too_narrow_accuses_no_record_and_widens(tmp_path):
+    """It is a multiple of the machine's scales: a size to expect, and no limit."""
+    read = read_campaign(write_link(tmp_path / "campaign"))
+    softest = 1.0 * read.plant.scales.speed / read.plant.scales.effort
+    narrow = (replace(p, high=softest) if p.name == "stiffness" else p for p in read.plant.parameters)
+    plant = replace(read.plant, parameters=tuple(narrow))
+    read = replace(read, plant=plant)
+    model = Model(plant)
+    (issue,) = data_issues(read, model, space_of(model))
+    assert (issue.kind, issue.record) == ("bounds", "")
+    assert "stiffness may lie outside the range that was searched" in issue.sentence
+    _, declared = prepared(model, read, candidates={})
+    assert model.parameters["stiffness"].high == pytest.approx(1.0)
+    assert declared.values["stiffness"] == pytest.approx(8.0, rel=0.02)

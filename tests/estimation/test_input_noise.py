@@ -7,11 +7,11 @@ import pytest
 
 from armid import close_loop, identify, read_campaign
 from armid.estimation.identify_document import answer, details_of, result_of
-from armid.estimation.input_noise import at_rest, cosines, moved_by_inputs, pooled_noise, smoothed
+from armid.estimation.input_noise import answers, at_rest, cosines, moved_by_inputs, pooled_noise, smoothed
 from armid.inference.infer import prepared
 from armid.loop import report_of
 from armid.loop.document import error_sentence
-from armid.model import Model
+from armid.model import EFFECTS, Model
 from armid.record.sensor import InputNoise, noise_of_input
 from synthetic import wheel, write_records
 
@@ -115,9 +115,23 @@ def held(folder, seed=4):
     return read_campaign(write_records(folder, HEAD.format('["torque_offset"]'), tables))
 
 
+def test_no_fit_of_a_start_takes_up_what_noise_of_an_input_does_later(tmp_path):
+    """Such a fit takes the noise as white, and would move the whole record: what is left looks like an offset."""
+    read = held(tmp_path / "held")
+    _, declared = prepared(read.model(EFFECTS), read, candidates={})
+    data, noise = declared.records.data, {"u": InputNoise(rms=0.01)}
+    assert data.inputs_count
+    for replay in declared.records.replays:
+        (piece,), (columns,) = replay.pieces, answers(replay.ready, [replay], declared.candidate, noise, [2e-6])
+        assert dict(piece.manoeuvre.constants).items() >= piece.shown_start.items()
+        assert not piece.correction.gain.any()
+        moved = np.sqrt(np.sum(columns[0] ** 2, axis=1))
+        assert moved[0] < 1e-3 * moved[-1]
+
+
 @pytest.mark.slow
 def test_a_load_that_a_controller_holds_lacks_nothing(tmp_path):
-    """Its starts are fitted as if what the noise does was white, which the covariance must know."""
+    """What the noise does to the whole record is no offset of the torque."""
     found = close_loop(held(tmp_path / "held"), candidates=["coulomb", "stribeck"])
     assert found.verdict == "no_discrepancy"
     assert next(e.value for e in found.after.estimates if e.name == "inertia") == pytest.approx(INERTIA, rel=0.01)
