@@ -240,9 +240,9 @@ def mistakes(trial: DataTrial, train: Sequence[Record]) -> tuple[list[DataIssue]
     if trial.model.plant.scales_from_records:
         own = DataTrial(trial.model, with_wider_ranges(trial.model, trial.space))
         start, error = own.fit(train)
-        outside = names_outside(trial.space, own.problem(train).values(start))
-        if outside:
-            words = f"{', '.join(outside)} may lie outside the range that was searched: with one eight times as wide"
+        beyond = names_outside(trial.space, own.problem(train).values(start))
+        if beyond:
+            words = f"{', '.join(beyond)} may lie outside the range that was searched: with one eight times as wide"
             tried.append((start, error, Correction("bounds", np.nan, words, lambda record: record), own, tuple(train)))
     # a poor fit of the declared model is not a mistake of the records, and of two corrections the better one is named
     likely = sorted(tried, key=lambda t: t[1])[:N_LIKELY]

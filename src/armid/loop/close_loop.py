@@ -114,7 +114,7 @@ def close_loop(
     library, declared = prepared(model, campaign, candidates, bounds, fixed, priors, threads, told, progress)
     space = library.space(library.declared, ())
     issues = data_issues(replace(campaign, records=campaign.train), library.declared, space)
-    # A limit that holds a parameter of the declared model looks like a wrong unit of all records, not like a wrong sign.
+    # A limit that holds a declared parameter looks like a wrong unit of all records, but not like a wrong sign.
     is_held = bool(held_by_bound(declared.records.space, declared.x).any())
     gross = [s for s in issues if s.kind in GROSS
              and not (is_held and not s.record and s.kind in OF_SIZE and s.factor != -1.0)]  # fmt: skip
