@@ -76,16 +76,15 @@ class MissingSignal:
 class Dependence:
     """Say that a signal at a port is factor x curve(variable), the curve straight between evenly spaced knots.
 
-    factor: "1", "direction" (sign of the speed) or "drive_effort". removed: share of the squared residual beyond the
-    reach of the free parameters that it removes; share: of records (or blocks of time) left out of its fit, below 0
-    where it makes their prediction worse. heights: of the curve at its knots from `first` to `last` [unit of the
+    factor: "1", "direction" (sign of the speed) or "drive_effort". share: of the squared residual beyond the reach of
+    the free parameters, that it removes in records (or blocks of time) left out of its fit; below 0 where it makes
+    their prediction worse. heights: of the curve at its knots from `first` to `last` [unit of the
     variable], fitted on all train records, (n_knots,).
     """
 
     port: str
     variable: str
     factor: str
-    removed: float
     share: float
     first: float
     last: float
@@ -97,8 +96,8 @@ class Missing:
     """Hold what is known of the signal that a model lacks.
 
     lacking: the model. signals: what would have to be added at each port, the port that removes most of the residual
-    first. segments: those to which they belong. dependences: curves over one variable, the one that removes most
-    first.
+    first. segments: those to which they belong. dependences: curves over one variable, the one that predicts
+    most first.
     """
 
     lacking: Fit
@@ -319,7 +318,7 @@ def dependences(segments: Sequence[Segment]) -> list[Dependence]:
     pairs = [(v, f) for v in segments[0].variables for f in segments[0].factors if v != f]
     dependences = [dependence(segments, port, variable, factor)
                    for port in segments[0].gains for variable, factor in pairs]  # fmt: skip
-    return sorted(dependences, key=lambda d: -d.removed)
+    return sorted(dependences, key=lambda d: -d.share)
 
 
 def dependence(segments: Sequence[Segment], port: str, variable: str, factor: str) -> Dependence:
@@ -341,10 +340,8 @@ def dependence(segments: Sequence[Segment], port: str, variable: str, factor: st
         others = reduce(add, [*parts[:i], *parts[i + 1 :]])
         before += left_out.without_curve.rest(others.without_curve.solution)
         after += left_out.rest(others.solution)
-    free_alone = total.without_curve.rest(total.without_curve.solution)
-    removed = 1.0 - total.rest(total.solution) / free_alone if free_alone > 0.0 else 0.0
     share = 1.0 - after / before if before > 0.0 else 0.0
-    return Dependence(port, variable, factor, removed, share, first, last, total.solution[n_free:])
+    return Dependence(port, variable, factor, share, first, last, total.solution[n_free:])
 
 
 def hats(values: Array, first: float, last: float, n_knots: int = N_HEIGHTS) -> Array:
