@@ -50,6 +50,8 @@ MOST_EXPANDED, MOST_EFFECTS = 16, 8
 # Above so many samples fewer models are expanded, but at least so many; so many constants within tolerances halve the
 # number.
 SAMPLES, FEWEST_EXPANDED, USUAL_CONSTANTS = 4_000, 8, 10
+# Steps between samples; an expansion with more counts as several: friction as sharp as a fast machine shows it.
+USUAL_STEPS = 16.0
 # Far from the noise: expansions without a better model after which the search stops, as what is missing has no name.
 MOST_IN_VAIN = 4
 # Most expansions of a last model that was never expanded, and fits of what was only forecast and would count.
@@ -122,11 +124,20 @@ def expand_all(exploration: Exploration, most: int | None, until: Callable[[Fit]
             if may_be_far_off(exploration, less):
                 complete(exploration, less)
         if next_model(exploration) == model:
+            work = expansions_of(exploration.fits[model])
+            if exploration.n_expanded and exploration.n_expanded + work > most:
+                return False
+            exploration.n_expanded += work
             expand(exploration, model)
             finish(exploration)
             is_better = exploration.ranked()[0][0] != best or is_near(exploration)
             exploration.in_vain = 0 if is_better else exploration.in_vain + 1
     return False
+
+
+def expansions_of(fit: Fit) -> float:
+    """Return as how many usual expansions the one of a model counts."""
+    return max(1.0, max(c.n_steps for r in fit.records.replays for c in r.calibrations) / USUAL_STEPS)
 
 
 def take_from_short_pieces(exploration: Exploration) -> None:
@@ -271,7 +282,6 @@ def expand(exploration: Exploration, model: Hypotheses) -> None:
     ahead_held = [forecast(held, p) for p in proposals]
     beside = [forecast(about, p) for p in others]
     exploration.forecasts[model] = [f.without_columns for f in (*ahead, *beside)]
-    exploration.n_expanded += 1
     limit = limit_of(exploration, scale)
     trials: list[Trial] = []
     if is_significant(fit):
