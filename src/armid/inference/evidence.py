@@ -12,6 +12,7 @@ Adding a column X with a strength of prior deviation s to a fit with residual r 
     2 ln B = (X'r)^2 / (|X|^2 + 1/s^2) - ln(1 + s^2 |X|^2),     X beyond what the unknowns of the fit can do.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -29,8 +30,9 @@ from armid.inference.library import Library
 from armid.inference.model import Fit
 from armid.model import Array
 
-# Prior standard deviations of a strength, as shares of its declared range: its size is known to orders of magnitude.
-SCALES_OF_STRENGTH = np.array([0.03, 0.1, 0.3, 1.0])
+# Prior standard deviations of a strength, as shares of its declared range: its size is known to orders of magnitude,
+# and may exceed that range.
+SCALES_OF_STRENGTH = np.array([0.03, 0.1, 0.3, 1.0, 3.0, 10.0])
 # Prior standard deviation of a constant whose tolerance is wrong, in tolerances.
 WRONG_TOLERANCE = 3.0
 # Fewest independent samples of a residual that is more than noise.
@@ -294,35 +296,46 @@ def log_evidence(about: Expansion) -> float:
     share = scale.n / len(fit.residual)
     evidence -= 0.5 * float(sum(f.value**2 + share * f.unknown.lost(f.value) for f in fit.others))
     evidence -= 0.5 * fit.records.data.log_cover
-    evidence += log_tails(fit)
-    for key in fit.active:
-        evidence += log_strength(about, key)
-    return evidence
+    return evidence + log_tails(fit) + log_strengths(about)
 
 
-def log_strength(about: Expansion, key: EffectKey) -> float:
-    """Return the log prior density of the strengths of an effect, averaged over their posterior and over the scales.
+def log_strengths(about: Expansion) -> float:
+    """Return the log prior density of the strengths of all effects, averaged over their posterior and over the scales.
 
-    The strength is half-normal, or normal where it may have either sign, with one of the scales.
+    A strength is half-normal, or normal where it may have either sign, with one of the scales. What the prior of one
+    effect tells of its strengths moves what is known of the others' (assumed density filtering): effects that the
+    records show only together are not each free to be what suits the other.
     """
     fit, space = about.fit, about.fit.records.space
-    low, high = space.low[space.free], space.high[space.free]
-    places: list[int] = []
-    shares: list[float] = []
-    density = 0.0
-    for i, (name, value) in enumerate(fit.values.items()):
-        parameter = fit.model.parameters[name]
-        if not key.owns(name) or parameter.null is None:
-            continue
-        places.append(i)
-        shares.append((value - parameter.null) / about.library.strength_of(name, parameter))
-        density += 0.0 if low[i] < parameter.null < high[i] else LOG_2
+    low, high, names = space.low[space.free], space.high[space.free], list(fit.values)
+    declared = fit.model.parameters
+    nulls = {i: null for i, name in enumerate(names) if (null := declared[name].null) is not None}
+    owned = [[i for i in nulls if key.owns(names[i])] for key in fit.active]
+    places = [i for own in owned for i in own]
     if not places:
         return 0.0
     size = about.sizes[places]
+    mean = np.array([(fit.values[names[i]] - nulls[i]) / about.library.strength_of(names[i], declared[names[i]])
+                     for i in places])  # fmt: skip
     covariance = about.covariance[np.ix_(places, places)] / np.outer(size, size)
-    densities = [log_normal(np.array(shares), covariance + s * s * np.eye(len(places))) for s in SCALES_OF_STRENGTH]
-    return float(density + logsumexp(densities) - np.log(len(SCALES_OF_STRENGTH)) - np.sum(np.log(size)))
+    signs = sum(not low[i] < nulls[i] < high[i] for i in places)
+    total = signs * LOG_2 - float(np.sum(np.log(size)))
+    for own in filter(None, owned):
+        at = [places.index(i) for i in own]
+        wider = [covariance[np.ix_(at, at)] + s * s * np.eye(len(at)) for s in SCALES_OF_STRENGTH]
+        densities = np.array([log_normal(mean[at], one) for one in wider])
+        total += float(logsumexp(densities)) - np.log(len(densities))
+        gains = [covariance[:, at] @ np.linalg.inv(one) for one in wider]
+        mean, covariance = pooled([(mean - gain @ mean[at], covariance - gain @ covariance[at]) for gain in gains],
+                                  np.exp(densities - logsumexp(densities)))  # fmt: skip
+    return float(total)
+
+
+def pooled(normals: Sequence[tuple[Array, Array]], weights: Array) -> tuple[Array, Array]:
+    """Return mean and covariance of a mixture of normal distributions."""
+    mean = np.sum([w * m for w, (m, _) in zip(weights, normals, strict=True)], axis=0)
+    spread = [w * (c + np.outer(m - mean, m - mean)) for w, (m, c) in zip(weights, normals, strict=True)]
+    return mean, np.sum(spread, axis=0)
 
 
 def log_tails(fit: Fit) -> float:

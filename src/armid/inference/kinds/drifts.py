@@ -8,11 +8,11 @@ import numpy as np
 from armid.estimation.constants import NAMED, Product
 from armid.inference.decisions import calibration
 from armid.inference.evidence import Expansion, Forecast
-from armid.inference.hypothesis import Hypothesis, Proposal
+from armid.inference.hypothesis import Hypotheses, Hypothesis, Proposal
 from armid.inference.kinds.faults import simulated_file, with_measured
 from armid.inference.library import Library
-from armid.inference.model import Fit, free_values, unless_diverged
-from armid.inference.unknowns import Unknown, freed
+from armid.inference.model import UNTOLD, Fit, free_values, unless_diverged
+from armid.inference.unknowns import Unknown, freed, polished
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array
 
@@ -22,6 +22,8 @@ FEWEST_RECORDS, FEWEST_OTHERS = 4, 2
 # Its largest plausible size, as a share of the constant, of a parameter that keeps its sign, or of the range of one
 # that does not; prior deviations as shares of that.
 LARGEST_DRIFT, SCALES_OF_DRIFT = 0.5, np.array([0.01, 0.03, 0.1, 0.3, 1.0])
+# How often its effect is taken anew, about the estimate of the fit before.
+MOST_TURNS = 8
 # Smallest size about which its effect is taken: of smaller ones rounding would speak.
 LEAST_SIZE = 0.01
 
@@ -120,15 +122,34 @@ def propose(fit: Fit, known: list[Hypothesis]) -> list[Proposal]:
     return proposals
 
 
+def taken_anew(model: Hypotheses, fit: Fit, weight: float) -> Fit:
+    """Return a polished fit with what its changes do taken about its estimate, until that stays."""
+    changes = {h.size_name: h.means for h in model if isinstance(h.means, OfParameter)}
+    for _ in range(MOST_TURNS if changes else 0):
+        others = (replace(f, unknown=Unknown(f.unknown.name, changes[f.unknown.name].undone(fit, within(f.value))))
+                  if f.unknown.name in changes else f for f in fit.others)  # fmt: skip
+        before, fit = fit, polished(replace(fit, others=tuple(others)), weight)
+        if abs(before.chi2 - fit.chi2) < UNTOLD:
+            break
+    return fit
+
+
+def within(size: float) -> float:
+    """Return a size about which the effect of a change is taken."""
+    return float(np.copysign(np.clip(abs(size), LEAST_SIZE, 1.0), size))
+
+
 def refit(hypothesis: Hypothesis, fit: Fit, about: Expansion, ahead: Forecast, limit: float) -> Fit | None:
-    """Return the model with a change, fitted about its own estimate twice: what it does is taken there."""
+    """Return the model with a change, fitted about its own estimate until that stays: what it does is taken there."""
     base, again, weight, size = fit.base or fit.records, fit, about.scale.weight, ahead.best(1)[0][1]
     others = [f.unknown for f in fit.others if f.unknown.name != hypothesis.size_name]
-    for is_first in (True, False, False):
-        size = float(np.copysign(np.clip(abs(size), LEAST_SIZE, 1.0), size))
-        unknown = Unknown(hypothesis.size_name, hypothesis.means.undone(again, size))
-        tried = unless_diverged(lambda: freed(again, base, [*others, unknown], weight, limit, is_first))  # noqa: B023
+    for turn in range(MOST_TURNS):
+        unknown = Unknown(hypothesis.size_name, hypothesis.means.undone(again, within(size)))
+        tried = unless_diverged(lambda: freed(again, base, [*others, unknown], weight, limit, turn == 0))  # noqa: B023
         if tried is None:
             return None
+        stays = turn > 1 and abs(tried.chi2 - again.chi2) < UNTOLD
         again, size = tried, tried.others[-1].value
+        if stays:
+            break
     return again
