@@ -1,6 +1,7 @@
 """The evidence against exact formulas of linear models, and the mixture against samples of it."""
 
 from dataclasses import replace
+from itertools import product
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,7 +10,15 @@ from scipy.stats import multivariate_normal, norm
 
 from armid.estimation.constants import NAMED
 from armid.inference.decisions import PriorBeliefs, calibration
-from armid.inference.evidence import Expansion, Scale, forecast, log_tails
+from armid.inference.evidence import (
+    SCALES_OF_STRENGTH,
+    Expansion,
+    Scale,
+    forecast,
+    log_normal,
+    log_strengths,
+    log_tails,
+)
 from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.posterior import Atom, Posterior, most_odds, truncated
 from armid.inference.whitening import Cover
@@ -179,3 +188,25 @@ def test_a_denied_name_leaves_its_weight_to_what_nobody_knows_and_none_to_its_ri
              for atom in left.atoms for names in [tuple(n for _, n in atom.names)]}  # fmt: skip
     assert means["rival",] == pytest.approx({"q": np.nan, "p": 2.0, "rival.size": 7.0}, nan_ok=True)
     assert means["torque",] == pytest.approx({"q": 5.0, "p": 3.0, "rival.size": np.nan}, nan_ok=True)
+
+
+@pytest.mark.parametrize("together", [0.0, 0.999])
+def test_strengths_that_the_records_show_only_together_count_with_one_joint_prior(together):
+    """Else each would be as large as suits its own prior, whatever the other has to be for that."""
+    value, deviations = np.array([4.0, 0.1]), np.array([2.0, 0.8])
+    covariance = np.outer(deviations, deviations) * np.array([[1.0, together], [together, 1.0]])
+    parameters = dict.fromkeys(("a.x", "b.x"), SimpleNamespace(null=0.0))
+    space = SimpleNamespace(low=np.full(2, -9.0), high=np.full(2, 9.0), free=np.ones(2, dtype=bool))
+    fit = SimpleNamespace(
+        values=dict(zip(parameters, value, strict=True)), model=SimpleNamespace(parameters=parameters),
+        active=[SimpleNamespace(owns=lambda n, e=e: n.startswith(e)) for e in ("a.", "b.")],
+        records=SimpleNamespace(space=space),
+    )  # fmt: skip
+    library = SimpleNamespace(strength_of=lambda *_: 1.0)
+    about = SimpleNamespace(fit=fit, library=library, sizes=np.ones(2), covariance=covariance)
+    each = [log_normal(value, covariance + np.diag(pair)) for pair in product(SCALES_OF_STRENGTH**2, repeat=2)]
+    exact = np.log(np.mean(np.exp(each)))
+    assert log_strengths(about) == pytest.approx(exact, abs=0.2)
+    alone = [np.mean([norm.pdf(v, 0.0, np.hypot(d, s)) for s in SCALES_OF_STRENGTH])
+             for v, d in zip(value, deviations, strict=True)]  # fmt: skip
+    assert (abs(np.sum(np.log(alone)) - exact) > 0.5) == (together > 0.0)

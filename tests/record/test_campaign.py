@@ -5,8 +5,10 @@ import pytest
 
 from armid.errors import ArmidError
 from armid.model import EFFECTS, PLANTS, Effect, Parameter
+from armid.problem.space import space_of
 from armid.record import Override, read_campaign, write_campaign
 from armid.record.table import read_table
+from synthetic import write_records
 
 DEGREE = np.pi / 180
 ARM = """\
@@ -142,3 +144,21 @@ def test_nothing_is_overwritten_or_half_written_and_numbers_read_back_to_the_bit
     for name, values in TABLES["a.csv"].items():
         np.testing.assert_array_equal(columns[name], values)
     assert [p.name for p in folder.parent.iterdir()] == ["out"]
+
+
+def test_a_prior_frees_a_parameter_that_the_plant_fixes(tmp_path):
+    times = np.arange(200) / 100.0
+    table = {"time_s": times, "drive_N_m": np.sin(times), "angle_rad": 1.0 - np.cos(times)}
+    tables = {"a.csv": table, "b.csv": table}
+    toml = 'name = "x"\nplant = "rotary_arm"\n{}'
+    read = read_campaign(write_records(tmp_path / "a", toml.format("[priors]\ngain = { mean = 0.4, sd = 0.02 }\n"),
+                                       tables))  # fmt: skip
+    assert "gain" in space_of(read.model(), read.parameters).free_names
+    assert read.known["gain"].mean == 0.4
+    fixed = "[parameters.gain]\nfixed = 0.4\n"
+    known = read_campaign(write_records(tmp_path / "b", toml.format(fixed), tables))
+    assert known.fixed_as_exact == ("gain",)
+    for more, said in (("[priors]\ngain = { mean = 0.4, sd = 0.02 }\n", "stands in priors and is fixed"),
+                       ("[tolerances]\ngain = 0.05\n", "in place of 'fixed' is expected")):  # fmt: skip
+        with pytest.raises(ArmidError, match=said):
+            read_campaign(write_records(tmp_path / said[:5], toml.format(fixed + more), tables))

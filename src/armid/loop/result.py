@@ -333,7 +333,7 @@ def report_of(loop: ClosedLoop) -> dict[str, Any]:
         "advice": loop.advice,
         "next_steps": loop.next_steps,
         "known_together": loop.known_together,
-        "taken_as_exact": loop.campaign.taken_as_exact,
+        "taken_as_exact": (*loop.campaign.taken_as_exact, *loop.campaign.fixed_as_exact),
         "log": log_of(loop.inference),
     })  # fmt: skip
 

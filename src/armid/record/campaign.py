@@ -88,6 +88,11 @@ class Campaign(Shown):
                         main=(main,))  # fmt: skip
 
     @property
+    def fixed_as_exact(self) -> tuple[str, ...]:
+        """Parameters that the campaign fixes, but at 0 or where it says how well it knows them."""
+        return tuple(n for n, one in self.parameters.items() if one.fixed and "." not in n and n not in self.rough)
+
+    @property
     def train(self) -> tuple[Record, ...]:
         """Records that an identification sees."""
         return tuple(r for r in self.records if r.role == "train")
@@ -224,13 +229,19 @@ def campaign_of(
             warnings.warn(f"{where}: constant '{name}' counts nowhere, since every record sets its own", stacklevel=2)
     train = [r for r in records if r.role == "train"]
     plant = scaled(with_sizes(whole.recording(recorded), train), train, where)
-    parameters = overrides_of(sheet.parameters, plant, effects, where)
+    parameters = with_free(overrides_of(sheet.parameters, plant, effects, where), known, plant, where)
     for name in sheet.truth:
         if name not in (names := named_parameters(plant, effects)):
             raise unknown_name("parameter", name, names, f"{where}, truth")
     held = ((p.name, parameters.get(p.name, Override()).fixed) for p in plant.parameters)
     fixed = {name: value for name, value in held if value is not None}
     tolerances = tolerances_of(sheet.tolerances, plant, where, fixed)
+    for name in fixed.keys() & sheet.tolerances.keys():
+        if (tolerance := sheet.tolerances[name]) < ROUGH:
+            value = fixed[name]
+            prior = f"[priors] {name} = {{ mean = {value:g}, sd = {abs(tolerance * value):g} }}"
+            raise ArmidError(f"{where}, tolerances: '{name}' is a parameter that is fixed, and known to {tolerance:g}: "
+                             f"{prior} in place of 'fixed' is expected")  # fmt: skip
     values = {c.name: c.value for c in plant.constants} | dict(sheet.constants) | fixed
     # of what is 0 in every record nothing is known by a share of it
     sized = {name for name, value in values.items() if any(r.constants.get(name, value) for r in records)}
@@ -457,6 +468,22 @@ def overrides_of(
         overrides[name] = validated(Override, table, place)
         check_bounds(overrides[name], resolve(known[name], plant.scales), place)
     return overrides
+
+
+def with_free(
+    overrides: Mapping[str, Override], known: Mapping[str, Known], plant: Plant, where: str
+) -> dict[str, Override]:
+    """Return overrides that free parameters which the plant fixes, and for which a prior is given."""
+    freed = dict(overrides)
+    for p in (p for p in plant.parameters if p.name in known):
+        own = overrides.get(p.name, Override())
+        if own.fixed is not None:
+            raise ArmidError(f"{where}: parameter '{p.name}' stands in priors and is fixed, one of the two is expected")
+        if p.fixed is not None:
+            scaled = resolve(p, plant.scales)
+            freed[p.name] = replace(own, low=scaled.low if own.low is None else own.low,
+                                    high=scaled.high if own.high is None else own.high)  # fmt: skip
+    return freed
 
 
 def named_parameters(plant: Plant, effects: Mapping[str, Effect]) -> dict[str, Parameter]:

@@ -11,7 +11,7 @@ from armid.inference.evidence import Expansion, Forecast
 from armid.inference.hypothesis import Hypotheses, Hypothesis, Proposal
 from armid.inference.kinds.faults import simulated_file, with_measured
 from armid.inference.library import Library
-from armid.inference.model import UNTOLD, Fit, free_values, unless_diverged
+from armid.inference.model import ROUGHLY, UNTOLD, Fit, free_values, unless_diverged
 from armid.inference.unknowns import Unknown, freed, polished
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array
@@ -148,7 +148,7 @@ def refit(hypothesis: Hypothesis, fit: Fit, about: Expansion, ahead: Forecast, l
         tried = unless_diverged(lambda: freed(again, base, [*others, unknown], weight, limit, turn == 0))  # noqa: B023
         if tried is None:
             return None
-        stays = turn > 1 and abs(tried.chi2 - again.chi2) < UNTOLD
+        stays = turn > 1 and abs(tried.chi2 - again.chi2) < max(UNTOLD, ROUGHLY * again.chi2)
         again, size = tried, tried.others[-1].value
         if stays:
             break
