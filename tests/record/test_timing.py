@@ -62,6 +62,7 @@ def test_irregular_times_are_resampled_with_a_warning(write):
     assert 9 < record.irregularity.largest_gap < 11
     np.testing.assert_allclose(np.diff(record.times), record.manoeuvre.interval)
     np.testing.assert_allclose(record.measured, motion(record.times), atol=3e-4)
+    assert record.unused == ("drive_V",)
     # the last sample of the grid may lie after the last row
     np.testing.assert_allclose(record.columns["drive_V"][:-1], record.times[:-1], atol=1e-9)
 

@@ -57,7 +57,8 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[C
         data = record.signals[0].data
         own = f"{n}" if data is None else f"{int(data.sum())} of {n}"
         text = f"{own} samples at {1.0 / record.manoeuvre.interval:.6g} Hz, noise {noise.rms:.3g} {record.unit}"
-        yield ContractPoint(f"{record.file}, {record.role}", True, f"{text} (from {noise.source})")
+        unused = f"; not used: {', '.join(record.unused)}" if record.unused else ""
+        yield ContractPoint(f"{record.file}, {record.role}", True, f"{text} (from {noise.source}){unused}")
     try:
         model = campaign.model(effects)
         space = space_of(model, campaign.parameters)

@@ -107,6 +107,7 @@ def record_of(table: CsvTable, sheet: RecordSheet, campaign: CampaignSheet, plan
         whole_pieces=(),
         earliest=timing.earliest,
         columns=columns,
+        unused=tuple(name for name in others if name not in {*sources.values(), *POSITIONS}),
         repeat_of=sheet.repeat_of or "",
         restart_s=sheet.restart_s,
         irregularity=timing.irregularity,

@@ -158,9 +158,9 @@ class Record:
     the order of the plant; `output`, `unit`, `measured`, `rest`, `noise` and what is counted are those of the first,
     and `each` holds a record for each. pieces: cut to the window; one piece unless `restart_s` was given. whole_pieces:
     the same before the window. earliest: first sample that may be in a window. columns: header -> the file's other
-    columns on the grid, in the unit of the header. repeat_of: file of the record whose manoeuvre this one repeats, or
-    "". irregularity: None where the file's times were even. input_noise: measured input -> its noise, SI; without
-    those that are exact.
+    columns on the grid, in the unit of the header; unused: those that are neither output nor input. repeat_of: file of
+    the record whose manoeuvre this one repeats, or "". irregularity: None where the file's times were even.
+    input_noise: measured input -> its noise, SI; without those that are exact.
     """
 
     file: str
@@ -171,6 +171,7 @@ class Record:
     whole_pieces: tuple[Piece, ...]
     earliest: int = 0
     columns: Mapping[str, Array] = field(default_factory=dict)
+    unused: tuple[str, ...] = ()
     repeat_of: str = ""
     restart_s: float | None = None
     irregularity: Irregularity | None = None
