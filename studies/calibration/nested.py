@@ -33,7 +33,7 @@ FAMILIES = ("control", "one", "two", "three", "fault")
 MOST_MODELS, FARTHEST = 3, 12.0
 N_LIVE, MOST_CALLS = 300, 400_000
 # Shares of the declared size of a strength on which the distribution of its prior is tabulated.
-SHARES = np.concatenate([[0.0], np.logspace(-8, 0.8, 4000)])
+SHARES = np.concatenate([[0.0], np.logspace(-8, 1.8, 4500)])
 LARGEST_LOSS = -1e100
 Draw = Callable[[np.ndarray], np.ndarray]
 

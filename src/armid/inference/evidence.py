@@ -33,6 +33,8 @@ from armid.model import Array
 # Prior standard deviations of a strength, as shares of its declared range: its size is known to orders of magnitude,
 # and may exceed that range.
 SCALES_OF_STRENGTH = np.array([0.03, 0.1, 0.3, 1.0, 3.0, 10.0])
+# Prior deviation of a strength that no record shows: rms of the scales within the declared range.
+USUAL_STRENGTH = 0.525
 # Prior standard deviation of a constant whose tolerance is wrong, in tolerances.
 WRONG_TOLERANCE = 3.0
 # Fewest independent samples of a residual that is more than noise.

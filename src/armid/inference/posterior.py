@@ -14,7 +14,7 @@ from scipy.special import logsumexp, ndtr
 from armid.estimation.least_squares import held_by_bound
 from armid.inference.checks import train_residuals
 from armid.inference.decisions import MENTIONED, calibration
-from armid.inference.evidence import SCALES_OF_STRENGTH, Expansion, expansion_of
+from armid.inference.evidence import USUAL_STRENGTH, Expansion, expansion_of
 from armid.inference.hypothesis import Hypotheses, log_prior
 from armid.inference.model import Fit
 from armid.inference.moves import Exploration
@@ -299,7 +299,7 @@ def unbounded(about: Expansion) -> Array:
     n, fit = int(about.kept.sum()), about.fit
     is_known = np.isin(np.arange(fit.n_free), fit.records.rows[0])[about.kept]
     flat = about.precision / np.append(np.where(is_known, 1.0, 2.0 * np.pi), np.ones(len(about.precision) - n))
-    usual = float(np.sqrt(np.mean(SCALES_OF_STRENGTH[SCALES_OF_STRENGTH <= 1.0] ** 2))) * about.sizes[about.kept]
+    usual = USUAL_STRENGTH * about.sizes[about.kept]
     flat[:n] *= np.where(usual < 1.0, 1.0 / usual, 1.0) ** 2
     columns, cover = confirmed_slopes(fit, about.unknowns, flat, about.scale.weight), fit.records.data.cover
     known = about.scale.weight * columns.T @ columns + np.diag(flat)
