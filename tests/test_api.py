@@ -28,6 +28,8 @@ from armid.units import angles_in, scale_of
 from commands import not_drawn
 
 QUICK = {"effects": ["viscous"], "budget": 60}
+# Where a word is near none that is known.
+OWN = "one of your own is a plug-in: the option plugin takes FILE.py:NAME"
 
 
 @pytest.fixture(scope="module")
@@ -261,9 +263,9 @@ def test_a_folder_whose_name_is_no_utf_8(found, tmp_path, run):
     (lambda a: armid.identify(a, seed="x"), "the seed is 'x'"),
     (lambda a: armid.identify(a, target="x"), "the target is 'x'"),
     (lambda a: armid.identify(3), "the campaign is a int"),
-    (lambda a: armid.identify(a, effects="own"), "your own is a plug-in: the option plugin takes FILE.py:NAME"),
-    (lambda a: armid.identify(a, identifier="own"), "your own is a plug-in: the option plugin takes FILE.py:NAME"),
-    (lambda a: armid.identify(a, fitness="own"), "your own is a plug-in: the option plugin takes FILE.py:NAME"),
+    (lambda a: armid.identify(a, effects="own"), OWN),
+    (lambda a: armid.identify(a, identifier="own"), OWN),
+    (lambda a: armid.identify(a, fitness="own"), OWN),
     (lambda a: armid.identify(pd.DataFrame({"time_s": [0.0]})), "needs its plant"),
     (lambda a: armid.identify(pd.DataFrame({"time_s": [0.0]}), plant="axis"), "axis"),
     (lambda a: armid.identify({f"{a}/move": pd.DataFrame({"time_s": [0.0]})}, plant="driven_axis"),

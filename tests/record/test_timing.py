@@ -84,6 +84,13 @@ def test_a_held_input_keeps_its_impulse():
     values = rng.normal(size=300)
     assert timing.finer == 4
     held = onto_grid(values, times, timing, "zero")
+    ends = timing.start + timing.interval * np.arange(1, timing.n_samples + 1)
+    told = np.interp(ends, times, np.append(0.0, np.cumsum(values[:-1] * np.diff(times))))
+    sums, within = timing.interval * np.cumsum(held), np.diff(np.searchsorted(times, ends)) == 0
+    tolerance = 3e-5 * np.max(np.abs(values))
+    # where a value changes, an eighth of the change is a sample late at most
+    np.testing.assert_allclose(sums[1:-1][within[:-1]], told[1:-1][within[:-1]], atol=tolerance)
+    np.testing.assert_allclose(sums[:-1], told[:-1], atol=tolerance + timing.interval * np.ptp(values) / 8)
     step = timing.interval / 1000
     fine = times[0] + step * (0.5 + np.arange(1000 * (timing.n_samples - 1)))
     true = values[np.searchsorted(times, fine, side="right") - 1]

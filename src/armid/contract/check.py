@@ -53,10 +53,11 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[C
     text = f"{n_train} to train on, {n_holdout} held out"
     yield ContractPoint("records", n_train > 0, text if n_holdout else f"{text}: nothing will judge what is found")
     for record in campaign.records:
-        noise, n = record.noise, record.measured.size
-        data = record.signals[0].data
-        own = f"{n}" if data is None else f"{int(data.sum())} of {n}"
-        text = f"{own} samples at {1.0 / record.manoeuvre.interval:.6g} Hz, noise {noise.rms:.3g} {record.unit}"
+        noise, signal, n = record.noise, record.signals[0], record.measured.size
+        n_seen = n if signal.data is None else int(signal.data.sum())
+        # a grid that is finer than the sensor has no sample to lose at most of its times
+        own = f"{n_seen} of {n}" if n_seen < n and signal.every == 1 else f"{n_seen}"
+        text = f"{own} samples at {1.0 / record.spacing:.6g} Hz, noise {noise.rms:.3g} {record.unit}"
         unused = f"; not used: {', '.join(record.unused)}" if record.unused else ""
         yield ContractPoint(f"{record.file}, {record.role}", True, f"{text} (from {noise.source}){unused}")
     try:

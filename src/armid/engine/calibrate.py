@@ -32,15 +32,11 @@ MOST_OF_PROBES, PART = 2**23, 8
 
 @dataclass(frozen=True)
 class Calibration:
-    """A schedule and the error that was measured for it on the probes, of all outputs the largest share of its size.
-
-    n_steps: integration steps between two samples that it took on these, where they were counted.
-    """
+    """A schedule and the error that was measured for it on the probes, of all outputs the largest share of its size."""
 
     schedule: Schedule
     error: float
     reached: bool
-    n_steps: float = 1.0
 
 
 def accuracy_against(noise: Mapping[str, float], model: Model) -> str:

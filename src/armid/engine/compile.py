@@ -81,7 +81,7 @@ class KeptCode:
         path = self._path(signature, target.codegen())
         content = None if path is None else read_whole(path)
         if content is None:
-            simd.ask_lanes_first()
+            simd.ask_lanes_first()  # it will be compiled now
             return None
         rtsys.initialize(target)
         return CompileResult._rebuild(target, *pickle.loads(content))

@@ -57,8 +57,6 @@ SAME_ERROR = 0.01
 LEAST_SHIFT, MOST_SHIFT = 3, 0.3
 # Integration steps between samples, relative fall of squares at which a rough fit has arrived.
 SUBSTEPS_CHECKED, CHECK_TOLERANCE = 4, 1e-3
-# How much wider a range becomes that is a multiple of the machine's scales, and that may be too narrow.
-WIDER_RANGE = 8.0
 # Longest sample interval of a motion that a motor drives [s].
 LONGEST_INTERVAL = 1.0
 # A record begins elsewhere than the model where each of so many first samples is more than so many times the noise, and
@@ -238,7 +236,8 @@ def mistakes(trial: DataTrial, train: Sequence[Record]) -> tuple[list[DataIssue]
         own = DataTrial(trial.model, declared)
         tried.append((*own.fit(train), WIDER_BOUNDS, own, tuple(train)))
     if trial.model.plant.scales_from_records:
-        own = DataTrial(trial.model, with_wider_ranges(trial.model, trial.space))
+        sized = set(sized_parameters(trial.model)) & set(trial.space.free_names)
+        own = DataTrial(trial.model, trial.space.with_wider(sized))
         start, error = own.fit(train)
         beyond = names_outside(trial.space, own.problem(train).values(start))
         if beyond:
@@ -270,14 +269,11 @@ def mistakes(trial: DataTrial, train: Sequence[Record]) -> tuple[list[DataIssue]
     return issues or everywhere, z
 
 
-def with_wider_ranges(model: Model, space: Space) -> Space:
-    """Return the space with wider ranges where they are multiples of the machine's scales: a size to expect."""
-    sized = [p.name for p in model.plant.parameters if powers_of(p.unit)]
-    sized += [f"{e.name}.{p.name}" for e in model.effects for p in e.parameters if p.null == 0.0 and powers_of(p.unit)]
-    for name in set(sized) & set(space.free_names):
-        low, high = float(space.low[space.index(name)]), float(space.high[space.index(name)])
-        space = space.with_bounds(name, low * WIDER_RANGE ** -np.sign(low), high * WIDER_RANGE)
-    return space
+def sized_parameters(model: Model) -> list[str]:
+    """Return parameters whose range is a multiple of the machine's scales: a size to expect."""
+    strengths = ((f"{e.name}.{p.name}", p) for e in model.effects for p in e.parameters if p.null == 0.0)
+    named = [*((p.name, p) for p in model.plant.parameters), *strengths]
+    return [name for name, p in named if powers_of(p.unit)]
 
 
 def names_outside(space: Space, values: Array) -> list[str]:

@@ -13,7 +13,6 @@ from armid.engine import along
 from armid.errors import ArmidError, nearest
 from armid.estimation.constants import NAMED
 from armid.estimation.corrections import rms
-from armid.estimation.data_checks import WIDER_RANGE
 from armid.estimation.information import NORMAL_95
 from armid.estimation.input_noise import estimated, pooled_noise
 from armid.estimation.least_squares import Estimates, descend, held_by_bound, spread_starts, with_fitted_starts
@@ -446,9 +445,8 @@ def with_scales(library: Library) -> tuple[Library, Fit]:
         own = {n for n in held & of_machine if library.owner(n) is None and abs(fit.values[n]) > 0.0}
         if not own:
             break
-        space = fit.records.space
-        ends = {n: (float(space.low[space.index(n)]), float(space.high[space.index(n)])) for n in own}
-        wider = {n: (low * WIDER_RANGE ** -np.sign(low), high * WIDER_RANGE) for n, (low, high) in ends.items()}
+        space = fit.records.space.with_wider(own)
+        wider = {n: (float(space.low[space.index(n)]), float(space.high[space.index(n)])) for n in own}
         library = replace(library, widened={**library.widened, **wider}, _problems={})
         fit = declared_fit(library)
     return library, fit

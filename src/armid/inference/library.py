@@ -459,7 +459,7 @@ def quickly_calibrated(
         error, is_hidden, good = judged(runs[n], runs[2 * n])
         if good:
             break
-    schedule, n_steps = Schedule(n, weights=switch_weights(spread, runs[n])), runs[n].n_steps
+    schedule = Schedule(n, weights=switch_weights(spread, runs[n]))
     if good and n >= FEWEST_SPARED:
         # Where steps are fine for the sake of a few samples (friction as it changes its sign), only these need be cut.
         sound = spread[~runs[2 * n].failed]
@@ -470,9 +470,9 @@ def quickly_calibrated(
             run = simulate(model, manoeuvre, spread, tried)
             judgement = judged(run, runs[2 * n])
             if judgement[2] and run.n_steps < n:
-                schedule, n_steps, (error, is_hidden, _) = tried, run.n_steps, judgement
+                schedule, (error, is_hidden, _) = tried, judgement
                 break
-    return Calibration(schedule, error, is_hidden or bool(error <= allowed), n_steps)
+    return Calibration(schedule, error, is_hidden or bool(error <= allowed))
 
 
 # A schedule serves until the residual is so many times smaller than that for which it was found.

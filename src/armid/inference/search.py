@@ -64,20 +64,17 @@ N_RIVALS = 3
 BEAM = 3
 
 
-def explore(
-    library: Library, declared: Fit, until: Callable[[Fit], bool] = lambda _: False, most: int | None = None
-) -> Exploration:
+def explore(library: Library, declared: Fit, until: Callable[[Fit], bool] = lambda _: False) -> Exploration:
     """Return the models that were explored from the declared one.
 
-    declared: its fit. until: whether a fit that leads, after an expansion, is reason to stop at once. most: models that
-    are expanded, None: as many as the samples allow.
+    declared: its fit. until: whether a fit that leads, after an expansion, is reason to stop at once.
     """
     exploration = begun(library, declared)
     expand_all(exploration, 1)
     if not is_near(exploration):
         take_from_short_pieces(exploration)
-    if expand_all(exploration, most, until) and add_unknown(exploration):
-        expand_all(exploration, most, until)
+    if expand_all(exploration, None, until) and add_unknown(exploration):
+        expand_all(exploration, None, until)
     if until(exploration.fits[exploration.ranked()[0][0]]):
         return exploration
     add_unknown(exploration)
@@ -137,7 +134,7 @@ def expand_all(exploration: Exploration, most: int | None, until: Callable[[Fit]
 
 def expansions_of(fit: Fit) -> float:
     """Return as how many usual expansions the one of a model counts."""
-    return max(1.0, max(c.n_steps for r in fit.records.replays for c in r.calibrations) / USUAL_STEPS)
+    return max(1.0, max(c.schedule.least for r in fit.records.replays for c in r.calibrations) / USUAL_STEPS)
 
 
 def take_from_short_pieces(exploration: Exploration) -> None:

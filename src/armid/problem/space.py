@@ -1,6 +1,6 @@
 """Which parameters are searched, between which bounds, and what the others are."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 from armid.errors import ModelError, nearest
 from armid.model import Array, Model
 from armid.record import Override
+
+# How much wider a range becomes that is a size to expect, where it may be too narrow.
+WIDER = 8.0
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,14 @@ class Space:
             raise ModelError(f"bounds of '{name}' are {low:g} and {high:g}: finite numbers, low < high, are expected")
         fixed = np.where(at, np.nan, self.fixed)
         return replace(self, low=np.where(at, low, self.low), high=np.where(at, high, self.high), fixed=fixed)
+
+    def with_wider(self, names: Iterable[str]) -> "Space":
+        """Return the space with ranges of some parameters eight times as wide; a range keeps its sign."""
+        space = self
+        for name in names:
+            low, high = float(self.low[self.index(name)]), float(self.high[self.index(name)])
+            space = space.with_bounds(name, low * WIDER ** -np.sign(low), high * WIDER ** np.sign(high))
+        return space
 
     def with_fixed(self, name: str, value: float) -> "Space":
         """Return the space with a parameter fixed.

@@ -38,8 +38,9 @@ LEAST_NOISE = 1e-6
 def with_starts(replays: Sequence[Replay], candidate: Array) -> tuple[Replay, ...]:
     """Return replays whose pieces start where one whole candidate fits best, ready to correct others about there.
 
-    Pieces whose start was measured and is not to be fitted (of a record that is held out) start where the candidate's
-    outputs show what the reader saw. Gauss-Newton steps from the piece's own start minimise
+    Pieces whose start was measured and is not to be fitted (of a record that is held out, or where noise of the inputs
+    counts) start where the candidate's outputs show what the reader saw. Gauss-Newton steps from the piece's own start
+    minimise
 
     J(s) = |x - y(s)|^2 / (max(1, m) c) + |(s - s_reader) / 3 deviations|^2
 
@@ -49,8 +50,7 @@ def with_starts(replays: Sequence[Replay], candidate: Array) -> tuple[Replay, ..
 
     def started(ready: ReadyRecord) -> ReadyRecord:
         starts = [Start(ready, k) for k in range(len(ready.record.pieces))]
-        pieces = tuple((one.fitted if one.piece.shown_start else one.read)(candidate) for one in starts)
-        return replace(ready, record=replace(ready.record, pieces=pieces))
+        return replace(ready, record=replace(ready.record, pieces=tuple(one.placed(candidate) for one in starts)))
 
     return with_each(replays, started)
 
@@ -197,20 +197,32 @@ class Start:
         both = np.linalg.solve(normal, np.column_stack([slopes, held * (shown - constants)]))
         return np.asarray(both[:, :-1]), np.asarray(both[:, -1])
 
-    def fitted(self, candidate: Array) -> Piece:
-        """Return the piece from the best start of a candidate, as it is where the candidate diverges.
+    def placed(self, candidate: Array) -> Piece:
+        """Return the piece from the start that belongs to a candidate, see `with_starts`."""
+        if not self.piece.shown_start:
+            return self.read(candidate)
+        return self.held(candidate) if self.piece.smoothed else self.fitted(candidate)
 
-        Where noise of the inputs counts, the doubt about the start is part of it (`whitening.with_answers`): the piece
-        starts where the candidate's outputs show what the reader saw, and no start is fitted.
+    def held(self, candidate: Array) -> Piece:
+        """Return the piece from where the candidate's outputs show what the reader saw, as it is where it diverges.
+
+        Where noise of the inputs counts, the doubt about the start is part of it (`whitening.with_answers`).
         """
+        population = candidate[np.newaxis]
+        (first,) = self.signals(self.constants[np.newaxis], population)[:, :, 0].T
+        constants = replace(self, off=self.off_by(first)).shown[0]
+        slopes = self.linear(constants, population)[1]
+        if not np.isfinite(slopes).all():
+            return self.piece
+        return self.corrected(
+            constants, slopes, np.zeros((len(constants), self.weights.size)), np.zeros(len(constants))
+        )
+
+    def fitted(self, candidate: Array) -> Piece:
+        """Return the piece from the best start of a candidate, as it is where the candidate diverges."""
         constants, population = self.constants, candidate[np.newaxis]
         signals, slopes = self.linear(constants, population)
         start = replace(self, off=self.off_by(signals[:, 0, 0]))
-        if self.piece.smoothed:
-            constants = start.shown[0]
-            slopes = self.linear(constants, population)[1]
-            gain, offset = np.zeros((len(constants), self.weights.size)), np.zeros(len(constants))
-            return self.corrected(constants, slopes, gain, offset) if np.isfinite(slopes).all() else self.piece
         for _ in range(MOST_OF_START):
             residual, seen = start.residual(signals)[0], start.seen_slopes(slopes)[:, 0]
             if not (np.isfinite(residual).all() and np.isfinite(seen).all()):

@@ -263,7 +263,7 @@ def campaign_of(
         chances=chances,
         truth=dict(sheet.truth),
         angle=recorded_in.pop() if len(recorded_in) == 1 else DEG,
-        known={name: one for name, one in known.items() if name in {p.name for p in plant.parameters} - fixed.keys()},
+        known={name: one for name, one in known.items() if name in {p.name for p in plant.parameters}},
     )  # fmt: skip
 
 

@@ -133,6 +133,11 @@ class Signal:
     def is_speed(self) -> bool:
         return self.unit in ("rad/s", "m/s")
 
+    @property
+    def every(self) -> int:
+        """Samples of the grid from one that was measured to the next."""
+        return 1 if self.data is None else int(np.median(np.diff(np.flatnonzero(self.data))))
+
     def samples(self, piece: Piece) -> Samples:
         """Return the samples of a piece that fitness and errors see: those of its window that were measured."""
         if self.data is None:
@@ -260,10 +265,7 @@ class Record:
     @property
     def spacing(self) -> float:
         """Time from one measured sample to the next [s]: the interval of the grid, or a multiple of it."""
-        data = self.signals[0].data
-        if data is None:
-            return self.manoeuvre.interval
-        return self.manoeuvre.interval * float(np.median(np.diff(np.flatnonzero(data))))
+        return self.manoeuvre.interval * self.signals[0].every
 
     @property
     def constants(self) -> Mapping[str, float]:

@@ -48,6 +48,11 @@ class Timing:
     irregularity: Irregularity | None
     finer: int = 1
 
+    @property
+    def widest(self) -> float:
+        """How far [s] a sample of the grid may be from a row: further away is a gap."""
+        return NEAR_SAMPLE * self.finer * self.interval
+
     def grid(self) -> Array:
         return self.start + self.interval * np.arange(self.n_samples, dtype=np.float64)
 
@@ -73,8 +78,8 @@ def timing_of(times: Array, from_rest: bool, file: str) -> Timing:
                          "at or before 0 is expected")  # fmt: skip
     resampled = not even or abs(begin - start) > tolerance
     finer = 1 if even else fineness(motion, start, interval)
-    interval /= finer
     n_samples = grid_size(motion, start, interval, finer, file) if resampled else motion.size
+    interval /= finer
     check_number(n_samples, f"{file}:", place)
     # a plant from rest may have lost its sample at t = 0; an axis may begin before 0, and what is before 0 never counts
     earliest = 0 if from_rest and first > 0 else int(np.ceil((max(begin, 0.0) - start) / interval - EVEN_TIMES))
@@ -149,13 +154,16 @@ def irregularity_of(times: Array) -> Irregularity | None:
 
 
 def grid_size(times: Array, start: float, interval: float, finer: int, file: str) -> int:
-    """Return the number of grid samples, the last at most half an interval off; refuse a grid that is mostly gaps."""
+    """Return the number of grid samples, the last at most half of one off; refuse a grid that is mostly gaps.
+
+    interval: of the rows. finer: samples for a row.
+    """
     length = float(times[-1]) - start
     size = length / interval
-    if size > MOST_FILLING * finer * times.size:
+    if size > MOST_FILLING * times.size:
         raise ArmidError(f"{file}: {times.size} samples at a median interval of {interval:.3g} s leave most of "
                          f"{length:.6g} s unmeasured, a record without such gaps is expected")  # fmt: skip
-    return int(size + 0.5) + 1
+    return int(finer * size + 0.5) + 1
 
 
 def onto_grid(values: Array, times: Array, timing: Timing, hold: str = "linear") -> Array:
@@ -188,9 +196,9 @@ def onto_grid(values: Array, times: Array, timing: Timing, hold: str = "linear")
 def moved_onto_grid(values: Array, times: Array, timing: Timing, rows: Mask) -> tuple[Array, Mask]:
     """Return a noisy column on the even grid and which of its samples were measured, both (n_samples,).
 
-    Each grid sample takes the nearest row, moved along a parabola through 7 neighbours: the noise stays
-    that of one sample and white, where a line between two rows would take a third off its variance and correlate
-    neighbours. Where no row of data is near, a straight line runs between those around.
+    Each grid sample takes the nearest row, moved along a parabola through 7 neighbours: the noise stays that of one
+    sample and white, where a line between two rows would take a third off its variance and correlate neighbours. Where
+    no row of data is near, a straight line runs between those around.
     values, times, rows (which are data): (n_rows,).
     """
     known = values if rows.all() else np.where(rows, values, np.interp(times, times[rows], values[rows]))
@@ -206,8 +214,8 @@ def moved_onto_grid(values: Array, times: Array, timing: Timing, rows: Mask) -> 
         return onto_grid(known, times, timing), data
     slope, bend = parabolas(known, times, nearest)
     moved = known[nearest] + (slope + bend * along) * along
-    widest = NEAR_SAMPLE * timing.finer * timing.interval
-    gap = np.maximum(np.abs(along), times[right] - times[right - 1] - timing.finer * timing.interval) > widest
+    apart = times[right] - times[right - 1] - timing.finer * timing.interval
+    gap = np.maximum(np.abs(along), apart) > timing.widest
     return np.where(gap, np.interp(grid, times, known), moved), data
 
 
@@ -216,7 +224,7 @@ def gap_samples(times: Array, timing: Timing) -> Mask:
     if not timing.resampled:
         return np.zeros(timing.n_samples, dtype=np.bool_)
     grid = timing.grid()
-    return np.asarray(np.abs(grid - times[around(times, grid)[1]]) > NEAR_SAMPLE * timing.finer * timing.interval)
+    return np.asarray(np.abs(grid - times[around(times, grid)[1]]) > timing.widest)
 
 
 def around(times: Array, grid: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -22,8 +22,8 @@ STEPS, TINY = 4, 1e-6
 class Track:
     """Hold a signal from which a start is taken, SI, on the grid.
 
-    noise: deviation of one sample. step: of the sensor, 0 for a fine one. every: samples of the grid for each that was
-    measured, where this is so all along; the others hold straight lines between these.
+    noise: deviation of one sample. step: of the sensor, 0 for a fine one. every: samples of the grid from one that was
+    measured to the next; those between hold straight lines.
     """
 
     values: Array
@@ -41,10 +41,9 @@ class Track:
 def track_of(signal: Signal) -> Track:
     """Return a signal with the noise of the start that it tells."""
     measured = 1.0 if signal.data is None else float(np.mean(signal.data))
-    every = int(1.0 / measured)
     # lost samples leave fewer to tell it
-    noise = signal.noise.rms / float(np.sqrt(every * measured))
-    return Track(signal.measured, noise, signal.sensor.step, every)
+    noise = signal.noise.rms / float(np.sqrt(min(signal.every * measured, 1.0)))
+    return Track(signal.measured, noise, signal.sensor.step, signal.every)
 
 
 def state_at(tracks: Mapping[str, Track], index: int) -> State:

@@ -15,6 +15,7 @@ from armid.inference.model import ROUGHLY, UNTOLD, Fit, free_values, unless_dive
 from armid.inference.unknowns import Unknown, freed, polished
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array
+from armid.problem.starts import fits_starts
 
 # Fewest record files for a drift to be considered: with fewer a drift is a change in one record. Of two records
 # either may be the other one.
@@ -123,8 +124,13 @@ def propose(fit: Fit, known: list[Hypothesis]) -> list[Proposal]:
 
 
 def taken_anew(model: Hypotheses, fit: Fit, weight: float) -> Fit:
-    """Return a polished fit with what its changes do taken about its estimate, until that stays."""
+    """Return a polished fit with what its changes do taken about its estimate, until that stays.
+
+    Fits whose starts follow them stay as they are, as in `polished`.
+    """
     changes = {h.size_name: h.means for h in model if isinstance(h.means, OfParameter)}
+    if fit.base is None or fits_starts(fit.base.replays):
+        return fit
     for _ in range(MOST_TURNS if changes else 0):
         others = (replace(f, unknown=Unknown(f.unknown.name, changes[f.unknown.name].undone(fit, within(f.value))))
                   if f.unknown.name in changes else f for f in fit.others)  # fmt: skip

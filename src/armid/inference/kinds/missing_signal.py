@@ -78,8 +78,8 @@ class Dependence:
 
     factor: "1", "direction" (sign of the speed) or "drive_effort". share: of the squared residual beyond the reach of
     the free parameters, that it removes in records (or blocks of time) left out of its fit; below 0 where it makes
-    their prediction worse. heights: of the curve at its knots from `first` to `last` [unit of the
-    variable], fitted on all train records, (n_knots,).
+    their prediction worse. heights: of the curve at its knots from `first` to `last` [unit of the variable], fitted on
+    all train records, (n_knots,).
     """
 
     port: str
@@ -96,8 +96,8 @@ class Missing:
     """Hold what is known of the signal that a model lacks.
 
     lacking: the model. signals: what would have to be added at each port, the port that removes most of the residual
-    first. segments: those to which they belong. dependences: curves over one variable, the one that predicts
-    most first.
+    first. segments: those to which they belong. dependences: curves over one variable, the one that predicts most
+    first.
     """
 
     lacking: Fit
