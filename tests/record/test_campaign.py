@@ -158,6 +158,8 @@ def test_a_prior_frees_a_parameter_that_the_plant_fixes(tmp_path):
     fixed = "[parameters.gain]\nfixed = 0.4\n"
     known = read_campaign(write_records(tmp_path / "b", toml.format(fixed), tables))
     assert known.fixed_as_exact == ("gain",)
+    exact = read_campaign(write_records(tmp_path / "c", toml.format(f"{fixed}[tolerances]\ngain = 0.0\n"), tables))
+    assert exact.parameters["gain"].fixed == 0.4
     for more, said in (("[priors]\ngain = { mean = 0.4, sd = 0.02 }\n", "stands in priors and is fixed"),
                        ("[tolerances]\ngain = 0.05\n", "in place of 'fixed' is expected")):  # fmt: skip
         with pytest.raises(ArmidError, match=said):

@@ -237,8 +237,8 @@ def campaign_of(
     fixed = {name: value for name, value in held if value is not None}
     tolerances = tolerances_of(sheet.tolerances, plant, where, fixed)
     for name in fixed.keys() & sheet.tolerances.keys():
-        if (tolerance := sheet.tolerances[name]) < ROUGH:
-            value = fixed[name]
+        value, tolerance = fixed[name], sheet.tolerances[name]
+        if value and 0.0 < tolerance < ROUGH:
             prior = f"[priors] {name} = {{ mean = {value:g}, sd = {abs(tolerance * value):g} }}"
             raise ArmidError(f"{where}, tolerances: '{name}' is a parameter that is fixed, and known to {tolerance:g}: "
                              f"{prior} in place of 'fixed' is expected")  # fmt: skip
