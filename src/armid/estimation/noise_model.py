@@ -167,7 +167,7 @@ def levels_left(
     for replay, level in zip(replays, levels, strict=True):
         sensor = sensor_of(replay.record)
         memory, sizes = shown[sensor]
-        rms = max(float(np.median(np.maximum(sizes, steps[sensor]))), hiding_noise(replay.model.plant, sensor[0], FINE))
+        rms = max(float(np.median(np.maximum(sizes, steps[sensor]))), engine_floor(replay))
         stays = level.known or (level.rms <= rms and not memory)
         noises.append(level if stays else remembering_level(rms, memory))
     return tuple(noises)
@@ -185,14 +185,18 @@ def levels_in_motion(
     doi:10.1214/aos/1176344136).
     left: of each record, its unit, not whitened.
     """
-    records, plant = [r.record for r in replays], replays[0].model.plant
+    records = [r.record for r in replays]
     grouped = by_sensor(records, list(zip(levels, replays, left, strict=True)))
     shown = {}
     for sensor, group in grouped.items():
         known, theirs, parts = (list(one) for one in zip(*group, strict=True))
         readings = [r.measured for r in theirs]
-        floor = max(hiding_noise(plant, sensor[0], FINE), *(r.record.signals[0].sensor.rounding for r in theirs))
-        white = white_level(max(float(np.sqrt(np.mean(np.concatenate(parts) ** 2))), floor), 0)
+        engine, left_over = engine_floor(theirs[0]), float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+        if left_over <= engine:
+            shown[sensor] = known[0]
+            continue
+        floor = max(engine, *(r.record.signals[0].sensor.rounding for r in theirs))
+        white = white_level(max(left_over, floor), 0)
         options = [(0, known[0]), (1, white), (2, alternating_level(parts, floor))]
         options += [(2, growing_level(readings, parts, floor))] if known[0].known else []
         n = sum(map(len, parts))
@@ -335,8 +339,13 @@ class Level:
     assumed: bool = False
 
 
+def engine_floor(replay: Replay) -> float:
+    """Return the rms of the least noise that the engine's own error does not reach [unit of the record]."""
+    return hiding_noise(replay.model.plant, replay.record.output, FINE)
+
+
 def level_of(replay: Replay, space: Space, x: Array) -> Level:
-    noise = replay.record.noise
+    noise = replace(replay.record.noise, rms=max(replay.record.noise.rms, engine_floor(replay)))
     candidate = space.complete(x[np.newaxis])
     residual = replay.measured - replay.signal(candidate)[0]
     rms = float(np.sqrt(np.mean(residual**2)))
@@ -387,7 +396,8 @@ def levels_of(replays: Sequence[Replay], space: Space, x: Array, noise: float | 
     levels = []
     for replay in replays:
         level = level_of(replay, space, x)
-        if replay.record.is_noise_free and level.rms <= NOISE_FREE * float(np.max(np.abs(replay.measured))):
+        least = max(NOISE_FREE * float(np.max(np.abs(replay.measured))), engine_floor(replay))
+        if replay.record.is_noise_free and level.rms <= least:
             level = Level(ASSUMED * float(np.sqrt(np.mean(replay.measured**2))), 1.0, assumed=True)
         levels.append(level)
     return tuple(levels)
