@@ -19,7 +19,7 @@ from armid.estimation.corrections import DataIssue
 from armid.estimation.information import Information, collinear, information_at
 from armid.estimation.input_noise import moved_by_inputs
 from armid.estimation.least_squares import held_by_bound, refine, with_fitted_starts
-from armid.estimation.noise_model import MISFIT, level_of
+from armid.estimation.noise_model import MISFIT, Level, NoiseModel, known_level, level_of
 from armid.identifiers import Identifier, run
 from armid.model import Array, Model
 from armid.problem.fitness import Fitness, chi_square, mean_square
@@ -184,7 +184,7 @@ class Identification(Result):
     @cached_property
     def outputs(self) -> dict[str, dict[str, Any]]:
         """Output -> its unit, the noise of its records, and how far noise of their inputs moves the model."""
-        return entries_of_noise(self.replays, [r.record.noise.rms for r in self.replays], self.candidate)
+        return entries_of_noise(self.replays, [known_level(r) for r in self.replays], self.candidate)
 
     @cached_property
     def interval_doubts(self) -> dict[str, str]:
@@ -394,7 +394,7 @@ def record_errors(replay: Replay, candidate: Array) -> Errors:
     square = float(mean_square(measured, simulated)[0])
     noise, interval = replay.record.noise.rms, replay.record.spacing
     s, s1, s2 = (float(v[0]) for v in similarity(measured, simulated, interval, noise=noise))
-    chi2 = float(chi_square(measured, simulated, noise)[0]) / len(measured) if noise > 0.0 else None
+    chi2 = float(chi_square(measured, simulated, noise)[0]) / len(measured) if not replay.record.is_noise_free else None
     if s2 < SHAPE_FALLS and s1 > NUMBERS_AGREE and chi2 is not None and chi2 < MISFIT:
         s = s2 = np.nan
     nrmse = np.sqrt(square / float(np.mean(measured**2)))
@@ -430,15 +430,20 @@ def output_errors(replays: Sequence[Replay], candidate: Array) -> Errors:
     )
 
 
-def entries_of_noise(replays: Sequence[Replay], noise: Sequence[float], candidate: Array) -> dict[str, dict[str, Any]]:
-    """Return output -> its unit, its noise (the mean over records) and how far that of inputs moves it, for JSON.
+def entries_of_noise(
+    replays: Sequence[Replay], levels: Sequence[Level | NoiseModel], candidate: Array
+) -> dict[str, dict[str, Any]]:  # fmt: skip
+    """Return what is known of the noise of each output, for JSON.
 
-    noise: of each replay, its unit.
+    Its unit, its noise (the mean over records) and in words what is special about it, how far noise of inputs moves it.
+    levels: of each replay.
     """
     outputs, moved = replays[0].model.plant.outputs, moved_by_inputs(replays, candidate)
-    levels = [(outputs[place], rms) for place, rms in by_output(replays, noise).items()]
-    return {o.name: {"unit": o.unit, "noise_rms": float(np.mean(rms)), "moved_by_inputs": moved.get(o.name, 0.0)}
-            for o, rms in levels}  # fmt: skip
+    return {outputs[place].name: {
+        "unit": outputs[place].unit, "noise_rms": float(np.mean([level.rms for level in of])),
+        "moved_by_inputs": moved.get(outputs[place].name, 0.0),
+        "noise_in_motion": next((level.remark for level in of if level.remark), ""),
+    } for place, of in by_output(replays, levels).items()}  # fmt: skip
 
 
 def errors_by_file(replays: Sequence[Replay], candidate: Array) -> dict[str, JointErrors]:

@@ -21,7 +21,6 @@ from armid.model import Array, Plant
 from armid.problem.problem import Replay
 from armid.problem.space import Space
 from armid.record import Noise, Record
-from armid.record.record import NOISE_FREE
 from armid.record.sensor import FEWEST_REST_SAMPLES, changing, correlation_sum, difference_rms, memory_of, new_share
 
 T = TypeVar("T")
@@ -34,8 +33,9 @@ CHANCE_OF_COLOUR, BLOCKS = 1e-3, (8, 32)
 # Least share of an error that comes back in the next sample, with the other sign, where noise alternates. That of
 # differences of counts is 1, less where the sensor has other noise too. White noise shows a small share by chance.
 LEAST_ALTERNATION = 0.5
-# What is assumed for a record without noise, as a share of its rms speed.
+# Noise that is assumed of a record without noise, as a share of its rms.
 ASSUMED = 1e-3
+IS_ASSUMED = f"assumed, {ASSUMED:.1%} of the motion, as the records hold none"
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class NoiseModel:
     of the inputs moves the signal, 0 where it does not count [unit of the records].
     n_samples: samples at rest from which it is known, 0 where none were recorded: then `rms` comes from differences of
     the motion, and is a lower bound rather than a measurement. n_slow, n_power: of these, how many count as independent
-    for slow signals, n/(1 + 2 sum rho), and for a mean square, n/(1 + 2 sum rho^2).
+    for slow signals, n/(1 + 2 sum rho), and for a mean square, n/(1 + 2 sum rho^2). assumed: the records hold none.
     """
 
     rms: float
@@ -61,6 +61,7 @@ class NoiseModel:
     growth: float = 0.0
     still: float = 0.0
     alternation: float = 0.0
+    assumed: bool = False
 
     @property
     def is_white(self) -> bool:
@@ -76,6 +77,11 @@ class NoiseModel:
         if self.alternation:
             return "it alternates from sample to sample, as that of differences of counts does"
         return f"in motion it grows with the reading, by {self.growth:.2%} of it" if self.growth else ""
+
+    @property
+    def remark(self) -> str:
+        """What is special about the noise, in words."""
+        return IS_ASSUMED if self.assumed else self.in_motion
 
     @property
     def total(self) -> float:
@@ -167,8 +173,8 @@ def levels_left(
     for replay, level in zip(replays, levels, strict=True):
         sensor = sensor_of(replay.record)
         memory, sizes = shown[sensor]
-        rms = max(float(np.median(np.maximum(sizes, steps[sensor]))), engine_floor(replay))
-        stays = level.known or (level.rms <= rms and not memory)
+        rms = max(float(np.median(np.maximum(sizes, steps[sensor]))), hiding_noise(replay.model.plant, sensor[0], FINE))
+        stays = level.known or level.assumed or (level.rms <= rms and not memory)
         noises.append(level if stays else remembering_level(rms, memory))
     return tuple(noises)
 
@@ -185,18 +191,17 @@ def levels_in_motion(
     doi:10.1214/aos/1176344136).
     left: of each record, its unit, not whitened.
     """
-    records = [r.record for r in replays]
+    records, plant = [r.record for r in replays], replays[0].model.plant
     grouped = by_sensor(records, list(zip(levels, replays, left, strict=True)))
     shown = {}
     for sensor, group in grouped.items():
         known, theirs, parts = (list(one) for one in zip(*group, strict=True))
         readings = [r.measured for r in theirs]
-        engine, left_over = engine_floor(theirs[0]), float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
-        if left_over <= engine:
+        if known[0].assumed:
             shown[sensor] = known[0]
             continue
-        floor = max(engine, *(r.record.signals[0].sensor.rounding for r in theirs))
-        white = white_level(max(left_over, floor), 0)
+        floor = max(hiding_noise(plant, sensor[0], FINE), *(r.record.signals[0].sensor.rounding for r in theirs))
+        white = white_level(max(float(np.sqrt(np.mean(np.concatenate(parts) ** 2))), floor), 0)
         options = [(0, known[0]), (1, white), (2, alternating_level(parts, floor))]
         options += [(2, growing_level(readings, parts, floor))] if known[0].known else []
         n = sum(map(len, parts))
@@ -267,6 +272,8 @@ def memory_and_sizes(parts: Sequence[Array]) -> tuple[float, list[float]]:
 
 
 def pooled_level(records: Sequence[Record], floor: float) -> NoiseModel:
+    if all(r.is_noise_free for r in records):
+        return replace(white_level(max(assumed_rms([r.measured for r in records]), floor), 0), assumed=True)
     rested = [r for r in records if r.noise.source == "rest"]
     if not rested:
         return white_level(max(float(np.median([r.noise.rms for r in records])), floor), 0)
@@ -338,19 +345,37 @@ class Level:
     from_residual: bool = False
     assumed: bool = False
 
+    @property
+    def remark(self) -> str:
+        """What is special about the noise, in words."""
+        return IS_ASSUMED if self.assumed else ""
 
-def engine_floor(replay: Replay) -> float:
-    """Return the rms of the least noise that the engine's own error does not reach [unit of the record]."""
-    return hiding_noise(replay.model.plant, replay.record.output, FINE)
+
+def assumed_rms(signals: Sequence[Array]) -> float:
+    """Return the rms of the noise that is assumed of signals without noise [their unit].
+
+    A simulated motion has errors of its simulation, of unknown size: what is much smaller shows nothing.
+    """
+    return ASSUMED * float(np.sqrt(np.mean(np.concatenate(signals) ** 2)))
+
+
+def known_level(replay: Replay) -> Level:
+    """Return the noise of a record, or what is assumed of one without noise."""
+    noise = replay.record.noise
+    if not replay.record.is_noise_free:
+        return Level(noise.rms, noise.effective_fraction)
+    floor = hiding_noise(replay.model.plant, replay.record.output, FINE)
+    return Level(max(assumed_rms([replay.measured]), floor), noise.effective_fraction, assumed=True)
 
 
 def level_of(replay: Replay, space: Space, x: Array) -> Level:
-    noise = replace(replay.record.noise, rms=max(replay.record.noise.rms, engine_floor(replay)))
+    known = known_level(replay)
+    noise = replace(replay.record.noise, rms=known.rms)
     candidate = space.complete(x[np.newaxis])
     residual = replay.measured - replay.signal(candidate)[0]
     rms = float(np.sqrt(np.mean(residual**2)))
-    known = Level(noise.rms, noise.effective_fraction)
-    if not np.isfinite(rms) or rms <= ENGINE_ERRORS * replay.engine_error_at(candidate[0]):
+    hidden = max(ENGINE_ERRORS * replay.engine_error_at(candidate[0]), known.rms if known.assumed else 0.0)
+    if not np.isfinite(rms) or rms <= hidden:
         return known
     if not is_noise(residual, noise):
         return Level(max(rms, noise.rms), 1.0 / (1.0 + 2.0 * correlation_sum(residual)), from_residual=True)
@@ -386,21 +411,14 @@ def is_noise(residual: Array, noise: Noise) -> bool:
 def levels_of(replays: Sequence[Replay], space: Space, x: Array, noise: float | None = None) -> tuple[Level, ...]:
     """Return the level of each record at a candidate: its noise, or its residual where that is far above the noise.
 
-    Without noise there is nothing to weigh a change against: then white noise of 0.1 % of the record's rms speed is
-    assumed, and the level says so. noise: rms to assume for every record in place of all that.
+    Without noise there is nothing to weigh a change against: then white noise is assumed, see `assumed_rms`, and the
+    level says so. noise: rms to assume for every record in place of all that.
     """
     if noise is not None:
         if len({r.place for r in replays}) > 1:
             raise ArmidError(f"a noise of {noise:g} was given, but records hold several outputs: none is expected")
         return tuple(Level(noise, 1.0, assumed=True) for _ in replays)
-    levels = []
-    for replay in replays:
-        level = level_of(replay, space, x)
-        least = max(NOISE_FREE * float(np.max(np.abs(replay.measured))), engine_floor(replay))
-        if replay.record.is_noise_free and level.rms <= least:
-            level = Level(ASSUMED * float(np.sqrt(np.mean(replay.measured**2))), 1.0, assumed=True)
-        levels.append(level)
-    return tuple(levels)
+    return tuple(level_of(replay, space, x) for replay in replays)
 
 
 def level_weights(levels: Sequence[Level]) -> tuple[float, ...]:

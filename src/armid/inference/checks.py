@@ -15,7 +15,6 @@ from armid.estimation.corrections import rms
 from armid.estimation.identify import JointErrors, campaign_errors
 from armid.estimation.information import start_changes
 from armid.estimation.input_noise import estimated, pooled_noise
-from armid.estimation.noise_model import engine_floor
 from armid.inference.decisions import SIGNIFICANCE
 from armid.inference.library import Library, calibrated_replays
 from armid.inference.model import Fit, beyond, decomposed
@@ -232,23 +231,18 @@ def train_residuals(fit: Fit) -> Residuals:
     if fit.start_slopes.shape[1]:
         basis = decomposed(np.hstack([fit.jacobian, fit.start_slopes]))[0]
         residual = beyond(basis, residual)
-    residual = residual + error_of_engine(fit.records.data, fit.records.replays)
+    residual = residual + assumed_noise(fit.records.data)
     return Residuals(fit.records.data, fit.records.replays, fit.candidate, residual, basis)
 
 
-def error_of_engine(data: WhitenedData, replays: Sequence[Replay]) -> Array:
-    """Return noise in the size of the engine's error for signals that have no other, 0 for the rest, (n_samples,).
+def assumed_noise(data: WhitenedData) -> Array:
+    """Return noise for the signals for which it is assumed, 0 for all others, (n_samples,).
 
-    What a right model leaves of a simulated motion is this error, whose colour would be taken for a discrepancy.
+    What a right model leaves of a simulated motion is the error of its simulation, whose colour is no discrepancy.
     """
-    pairs = list(zip(data.levels, replays, np.diff(data.edges), strict=True))
-    rng = np.random.default_rng(0)
-    return np.concatenate(
-        [
-            rng.standard_normal(n) if not level.known and level.rms <= engine_floor(r) else np.zeros(n)
-            for level, r, n in pairs
-        ]
-    )
+    rng, lengths = np.random.default_rng(0), np.diff(data.edges)
+    return np.concatenate([rng.standard_normal(n) if level.assumed else np.zeros(n)
+                           for level, n in zip(data.levels, lengths, strict=True)])  # fmt: skip
 
 
 def is_significant(fit: Fit) -> bool:
@@ -290,7 +284,7 @@ def holdout_residuals(fit: Fit, records: tuple[Record, ...], library: Library) -
     spread = spread[:, np.isfinite(residual).all() & np.isfinite(spread).all(axis=0)]
     base, sizes, _ = np.linalg.svd(spread, full_matrices=False)
     left = residual - base @ ((1.0 - 1.0 / np.sqrt(1.0 + sizes**2)) * (base.T @ residual))
-    left = left + error_of_engine(data, ready)
+    left = left + assumed_noise(data)
     return Residuals(data, ready, fit.candidate, np.asarray(left), np.empty((len(residual), 0)),
                      bool(within or starts), train_residuals(fit))  # fmt: skip
 

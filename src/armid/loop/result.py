@@ -229,12 +229,7 @@ class ClosedLoop(Result):
     def outputs(self) -> dict[str, dict[str, Any]]:
         """Output -> its unit, the noise of its train records, and how far noise of their inputs moves the model."""
         levels, train = self.before.train.data.levels, self.after.train
-        entries = entries_of_noise(train.replays, [level.rms for level in levels], train.candidate)
-        for replay, level in zip(train.replays, levels, strict=True):
-            # records of one output may have sampling intervals, hence noises, of their own
-            entry = entries[train.model.plant.outputs[replay.place].name]
-            entry["noise_in_motion"] = entry.get("noise_in_motion") or level.in_motion
-        return entries
+        return entries_of_noise(train.replays, levels, train.candidate)
 
     @property
     def noise_rms(self) -> float:
