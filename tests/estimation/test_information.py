@@ -53,8 +53,10 @@ def test_the_reference_arm_on_one_stroke_with_more_with_coloured_and_without_noi
     np.testing.assert_allclose(coloured.deviation, 2 * plain.deviation)
     clean = lowering_replays[0].measuring(lowering_replays[0].signal(TRUTH[np.newaxis])[0])
     information = information_at((with_noise(clean, 0.0),), arm_space, TRUTH)
-    np.testing.assert_array_equal(information.half_width, 0.0)
-    assert not information.levels[0].from_residual
+    (level,) = information.levels
+    assert level.assumed
+    assert not level.from_residual
+    assert level.rms == pytest.approx(1e-3 * np.sqrt(np.mean(clean.measured**2)))
     assert collinear(information)
 
 

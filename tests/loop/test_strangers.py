@@ -180,18 +180,33 @@ def from_counts(motion, rng):
     return np.diff(counts, prepend=counts[0]) * 2.0 * np.pi / COUNTS / 0.01
 
 
-@pytest.mark.parametrize("sensor", [by_reading, from_counts])
-def test_noise_that_no_rest_tells_is_nothing_that_the_machine_lacks(tmp_path, sensor):
+def dragged(folder, sensor, n_steps):
+    """Close the loop on a disc with a drag that its model lacks; n_steps: of its simulation, for a sample."""
     rng, files = np.random.default_rng(31), []
     for _ in range(4):
         voltage = np.repeat(rng.uniform(-9.0, 9.0, 15), 40)
         voltage[:60] = 0.0
         motion = moved(lambda x, fed: turning(x, fed) - [0.0, DRAG * x[1] * abs(x[1]) / INERTIA], voltage, 0.01,
-                       (0.0, 0.0), "zero", 4)  # fmt: skip
+                       (0.0, 0.0), "zero", n_steps)  # fmt: skip
         speed = sensor(motion, rng)
         files.append({"time_s": 0.01 * np.arange(len(voltage)), "voltage_V": voltage, "angular_velocity_rad_s": speed})
-    records = campaign(tmp_path, DISC, files)
-    found = close_loop(records.model(), records, {n: EFFECTS[n] for n in ("quadratic_drag", "output_delay", "cogging")})
+    records = campaign(folder, DISC, files)
+    names = ("quadratic_drag", "output_delay", "cogging")
+    return close_loop(records.model(), records, {name: EFFECTS[name] for name in names})
+
+
+def test_what_a_simulation_without_noise_errs_is_nothing_that_the_machine_lacks(tmp_path):
+    found = dragged(tmp_path, lambda motion, rng: motion[:, 1], 1)
+    assert found.verdict == "explained"
+    assert found.effects == ("quadratic_drag",)
+    assert "assumed" in found.outputs["angular_velocity"]["noise_in_motion"]
+    assert found.after.holdout.errors.rmse < 0.1 * found.noise_rms
+    assert found.after.holdout.errors.chi2_per_sample is None
+
+
+@pytest.mark.parametrize("sensor", [by_reading, from_counts])
+def test_noise_that_no_rest_tells_is_nothing_that_the_machine_lacks(tmp_path, sensor):
+    found = dragged(tmp_path, sensor, 4)
     chances = found.inference.probabilities
     assert chances["unknown"] < 0.1
     assert chances["effects"]["quadratic_drag"] > 0.9

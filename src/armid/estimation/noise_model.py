@@ -374,8 +374,8 @@ def level_of(replay: Replay, space: Space, x: Array) -> Level:
     candidate = space.complete(x[np.newaxis])
     residual = replay.measured - replay.signal(candidate)[0]
     rms = float(np.sqrt(np.mean(residual**2)))
-    hidden = max(ENGINE_ERRORS * replay.engine_error_at(candidate[0]), known.rms if known.assumed else 0.0)
-    if not np.isfinite(rms) or rms <= hidden:
+    is_hidden = rms <= ENGINE_ERRORS * replay.engine_error_at(candidate[0]) or (known.assumed and rms <= known.rms)
+    if not np.isfinite(rms) or is_hidden:
         return known
     if not is_noise(residual, noise):
         return Level(max(rms, noise.rms), 1.0 / (1.0 + 2.0 * correlation_sum(residual)), from_residual=True)

@@ -238,7 +238,7 @@ def train_residuals(fit: Fit) -> Residuals:
 def assumed_noise(data: WhitenedData) -> Array:
     """Return noise for the signals for which it is assumed, 0 for all others, (n_samples,).
 
-    What a right model leaves of a simulated motion is the error of its simulation, whose colour is no discrepancy.
+    What a right model leaves of a simulated motion is the error of its simulation, which has a colour.
     """
     rng, lengths = np.random.default_rng(0), np.diff(data.edges)
     return np.concatenate([rng.standard_normal(n) if level.assumed else np.zeros(n)
