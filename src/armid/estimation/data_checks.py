@@ -509,12 +509,13 @@ def of_position(record: Record) -> Iterator[DataIssue]:
 def given_twice(records: Sequence[Record]) -> Iterator[DataIssue]:
     """Yield the pairs of records, no repeats of each other, that hold the same samples: one recording given twice.
 
-    Compared are fingerprints of `ALIKE` successive samples; simulations without noise may well agree.
+    Compared are fingerprints of `ALIKE` successive samples; simulations without noise may well agree. What two windows
+    of one recording share begins where one of them begins, and ends where one ends; elsewhere a coarse sensor agrees.
     """
     records = [filled(r) for r in records if not r.is_noise_free]
     if len(records) < 2:
         return
-    prints = [fingerprints(r.seen) for r in records]
+    prints, places = zip(*(fingerprints(r.seen) for r in records), strict=True)
     owner = np.concatenate([np.full(len(p), i) for i, p in enumerate(prints)])
     _, place, counts = np.unique(np.concatenate(prints), return_inverse=True, return_counts=True)
     shared = np.flatnonzero(counts[place] > 1)
@@ -522,20 +523,25 @@ def given_twice(records: Sequence[Record]) -> Iterator[DataIssue]:
     pairs = Counter(pair for group in groups for pair in combinations(np.unique(group).tolist(), 2))
     for (i, j), n in sorted(pairs.items()):
         a, b = records[i], records[j]
-        if a.manoeuvre_file == b.manoeuvre_file:
+        _, in_a, in_b = np.intersect1d(prints[i], prints[j], return_indices=True)
+        alike = ((places[i], places[i][in_a]), (places[j], places[j][in_b]))
+        overlaps = all(any(end(whole) == end(part) for whole, part in alike) for end in (np.min, np.max))
+        if a.manoeuvre_file == b.manoeuvre_file or not overlaps:
             continue
         yield DataIssue("twice", a.file, f"{a.file} and {b.file} hold the same {n + ALIKE_VALUES - 1} samples: one "
                         "recording is given twice, records that do not overlap are expected.")  # fmt: skip
 
 
-def fingerprints(values: Array) -> NDArray[np.uint64]:
-    """Return a number for each run of `ALIKE` samples that takes `DIFFERENT` values or more, each run once."""
+def fingerprints(values: Array) -> tuple[NDArray[np.uint64], NDArray[np.int64]]:
+    """Return a number for each run of `ALIKE` samples that takes `DIFFERENT` values or more, and where it first is."""
     n = len(values) - ALIKE_VALUES + 1
     if n < 1:
-        return np.empty(0, dtype=np.uint64)
+        return np.empty(0, dtype=np.uint64), np.empty(0, dtype=np.int64)
     bits, hashes = np.ascontiguousarray(values + 0.0).view(np.uint64), np.zeros(n, dtype=np.uint64)
     changes = np.append(0, np.cumsum(values[1:] != values[:-1]))
     for i in range(ALIKE_VALUES):
         hashes = hashes * np.uint64(0x100000001B3) + bits[i : i + n]
         hashes ^= hashes >> np.uint64(29)
-    return np.unique(hashes[changes[ALIKE_VALUES - 1 :] - changes[:n] >= DIFFERENT])
+    moving = np.flatnonzero(changes[ALIKE_VALUES - 1 :] - changes[:n] >= DIFFERENT)
+    found, first = np.unique(hashes[moving], return_index=True)
+    return found, moving[first]

@@ -1,9 +1,10 @@
 """Infer what a declared model lacks: the models that the train records ask for, and how probable each is."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from math import comb
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -26,13 +27,13 @@ from armid.inference.hypothesis import Hypotheses, Hypothesis
 from armid.inference.kinds.effects import least_waves
 from armid.inference.kinds.same_law import doubles
 from armid.inference.library import Library, library_of
-from armid.inference.model import ROUGHLY, Fit, accurate, fit_from, start_of
+from armid.inference.model import ROUGHLY, Fit, accurate, fit_from, start_of, unless_diverged, with_own_shapes
 from armid.inference.moves import Exploration
 from armid.inference.posterior import CONSTANTS_TEXT, Posterior, posterior, spread
 from armid.inference.search import explore, without_denied
 from armid.inference.unknowns import freed
 from armid.inference.whitening import WhiteRecords, whitened, with_answers
-from armid.model import EFFECTS, Array, Effect, Model
+from armid.model import EFFECTS, Array, Effect, Model, refusal_of
 from armid.model.effects.sensor import sensor_effects
 from armid.problem.space import Space
 from armid.record import Campaign
@@ -288,13 +289,31 @@ def prepared(
     if estimates:
         told(f"going on from {len(estimates)} fits of {progress}")
     data = replace(whitened(campaign.train, model.plant), estimates=estimates)
-    library = library_of(model, candidates, data, campaign.parameters, bounds or {}, fixed or {}, threads, told, within)
     chances = {**campaign.chances, **(priors or {})}
     known = {name: (one.mean, one.sd) for name, one in campaign.known.items()}
-    library = replace(library, reach=REACH_OF_STRENGTHS, priors=chances, known=known)
-    problem = library.problem(())
-    library = library.about(with_fitted_starts(problem.replays, problem.space))
-    exact, declared = with_noise(*with_scales(library))
+
+    def fitted(model: Model, alone: bool = False) -> tuple[Library, Fit]:
+        library = library_of(model, candidates, data, campaign.parameters, bounds or {}, fixed or {}, threads, told,
+                             within)  # fmt: skip
+        bundles = () if alone else library.bundles
+        library = replace(library, reach=REACH_OF_STRENGTHS, priors=chances, known=known, bundles=bundles)
+        problem = library.problem(())
+        library = library.about(with_fitted_starts(problem.replays, problem.space))
+        return with_fitting_shapes(*with_noise(*with_scales(library)))
+
+    def fit_alone(model: Model) -> Fit:
+        return fitted(model, alone=True)[1]
+
+    exact, declared = fitted(model)
+    given = {*(bounds or {}), *(fixed or {})}
+    while True:
+        fits = [(form, unless_diverged(partial(fit_alone, form))) for form in other_forms(exact.declared, given)]
+        # another form is charged as a parameter is
+        likelier = [(schwarz(fit, more=1), form) for form, fit in fits
+                    if fit is not None and schwarz(fit, more=1) > schwarz(declared)]  # fmt: skip
+        if not likelier:
+            break
+        exact, declared = fitted(max(likelier, key=itemgetter(0))[1])
     library = with_input_noise(exact, declared)
     declared = declared if library is exact else declared_again(library, declared)
     library = replace(library, doubles=doubles(declared, library), least_waves=least_waves(declared), _problems={})
@@ -450,6 +469,39 @@ def with_scales(library: Library) -> tuple[Library, Fit]:
         library = replace(library, widened={**library.widened, **wider}, _problems={})
         fit = declared_fit(library)
     return library, fit
+
+
+def other_forms(model: Model, given: Set[str]) -> Iterator[Model]:
+    """Yield a model with each of its effects that is in the first of its forms in each other one.
+
+    A user who declares friction knows that it is there, and seldom its form. given: parameters that the user bounds or
+    fixes, which the other form has to have.
+    """
+    for effect in model.effects:
+        wanted = {name for name in given if name.startswith(f"{effect.name}.")}
+        for form in effect.searched_forms[1:]:
+            if wanted <= {f"{form.name}.{p.name}" for p in form.parameters} and not refusal_of(form, model.plant):
+                yield replace(model, effects=tuple(form if e is effect else e for e in model.effects))
+
+
+def schwarz(fit: Fit, more: int = 0) -> float:
+    """Return how probable the records are by a fit, its parameters and some more charged.
+
+    Schwarz 1978, doi:10.1214/aos/1176344136.
+    """
+    return fit.log_density - 0.5 * (fit.n_free + more) * float(np.log(len(fit.residual)))
+
+
+def with_fitting_shapes(library: Library, declared: Fit) -> tuple[Library, Fit]:
+    """Return the library with the shapes of the declared model's effects free where the records deny those it fixes.
+
+    The width over which a sign is smoothed is no knowledge of the user; what a wrong one leaves looks like an effect.
+    """
+    if not library.own_shapes:
+        return library, declared
+    free = replace(library, own_shapes_free=True, _problems={})
+    wide = unless_diverged(lambda: with_own_shapes(declared, free))
+    return (library, declared) if wide is None or schwarz(wide) <= schwarz(declared) else (free, wide)
 
 
 def with_noise(library: Library, declared: Fit) -> tuple[Library, Fit]:

@@ -60,7 +60,7 @@ class Library:
     reach: by which factor strengths that scale with the machine may exceed their declared range. widened: ranges of
     strengths of the declared model that were too narrow. doubles: effects that are the law of a free parameter of the
     declared model, or of a constant within its tolerance. least_waves: smallest wave number of a candidate that repeats
-    with position.
+    with position. own_shapes_free: whether the shapes of the declared model's effects, which it fixes, are free.
     """
 
     declared: Model
@@ -81,6 +81,7 @@ class Library:
     widened: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     doubles: Mapping[EffectKey, Double] = field(default_factory=dict)
     least_waves: float = 0.0
+    own_shapes_free: bool = False
     _models: dict[Active, Model] = field(default_factory=dict)
     _problems: dict[frozenset[EffectKey], WhiteRecords] = field(default_factory=dict)
     _schedules: dict[EffectKey, "Schedules"] = field(default_factory=dict)
@@ -216,7 +217,7 @@ class Library:
 
     def space(self, model: Model, active: Active) -> Space:
         """Return the space of a compiled model in which the candidates that are not active rest at their null."""
-        names = set(model.parameters)
+        names, own = set(model.parameters), self.own_shapes if self.own_shapes_free else ()
         space = space_of(
             model, self.overrides, {n: b for n, b in self.bounds.items() if n in names},
             {n: v for n, v in self.fixed.items() if n in names},
@@ -228,7 +229,7 @@ class Library:
             mine = next((k for k in active if k.declared == owner), None)
             if (owner is not None and mine is None) or name.startswith(PROBE):
                 space = space.with_fixed(name, idle(parameter))
-            elif mine is not None and mine.free_shape and name in self.fixed_shapes(mine):
+            elif name in own or (mine is not None and mine.free_shape and name in self.fixed_shapes(mine)):
                 space = space.with_bounds(name, parameter.low, parameter.high)
             elif self.reach > 1.0 and mine is not None and name in space.free_names and name in self.scaled_strengths:
                 space = space.with_bounds(name, *self.box_of(name, parameter))
@@ -280,9 +281,17 @@ class Library:
 
     def fixed_shapes(self, key: EffectKey) -> tuple[str, ...]:
         """Return the parameters of a candidate that are fixed by its declaration alone."""
+        return self.not_given(key.compiled, self.candidates[key.declared])
+
+    @cached_property
+    def own_shapes(self) -> tuple[str, ...]:
+        """The parameters of the declared model's effects that are fixed by the declarations of these alone."""
+        return tuple(name for effect in self.declared.effects for name in self.not_given(effect.name, effect))
+
+    def not_given(self, name: str, effect: Effect) -> tuple[str, ...]:
         given = {*self.bounds, *self.fixed, *(n for n, o in self.overrides.items() if o.fixed is not None)}
-        shapes = [p.name for p in self.candidates[key.declared].parameters if p.fixed is not None]
-        return tuple(n for n in (f"{key.compiled}.{shape}" for shape in shapes) if n not in given)
+        shapes = (f"{name}.{p.name}" for p in effect.parameters if p.fixed is not None)
+        return tuple(n for n in shapes if n not in given)
 
     def each(self, work: Callable[[S], T], items: Iterable[S]) -> list[T]:
         return side_by_side(work, items, self.threads)

@@ -245,6 +245,7 @@ def finished(fit: Fit, library: Library) -> Fit:
 
     done = from_starts([fit.z])
     shapes = {name for key in fit.active if key.free_shape for name in library.fixed_shapes(key)}
+    shapes |= set(library.own_shapes if library.own_shapes_free else ())
     if not shapes or done.has_arrived:
         return done
     starts = continued(done, shapes)
@@ -322,16 +323,34 @@ def with_free_shapes(fit: Fit, key: EffectKey, library: Library, problem: WhiteR
     """
     active = freed(fit.active, key)
     records = problem_about(fit, active, library) if problem is None else problem
-    known = dict(zip(fit.records.space.names, fit.candidate, strict=True))
-    z = records.shares(np.array([known[n] for n in records.space.free_names]))
-    free = np.array([n in library.fixed_shapes(key) for n in records.space.free_names])
-    starts = [np.where(free, share, z) for share in STARTS]
     # The strength has taken up what it could of the shape's part, so that each shape is tried without it too.
     rest = records.shares(at_null(records, fit.candidate, key)[records.space.free])
-    units = [records.model.parameters[n].unit for n in records.space.free_names]
+    return fit_from(records, active, starts_of_shapes(fit, records, library.fixed_shapes(key), [rest]), rough=True)
+
+
+def with_own_shapes(fit: Fit, library: Library) -> Fit:
+    """Return a fit of the declared model with the fixed shapes of its own effects free.
+
+    library: one in which they are.
+    """
+    records = problem_about(fit, (), library)
+    return finished(fit_from(records, (), starts_of_shapes(fit, records, library.own_shapes), rough=True), library)
+
+
+def starts_of_shapes(
+    fit: Fit, records: WhiteRecords, shapes: Sequence[str], rests: Sequence[Array] = ()
+) -> list[Array]:
+    """Return candidates, as shares of their range, from which the fit of a problem with some more shapes free begins.
+
+    fit: where they are fixed. rests: candidates from which each shape is tried too.
+    """
+    known, names = dict(zip(fit.records.space.names, fit.candidate, strict=True)), records.space.free_names
+    z, free = records.shares(np.array([known[n] for n in names])), np.isin(names, list(shapes))
+    starts = [np.where(free, share, z) for share in STARTS]
+    units = [records.model.parameters[n].unit for n in names]
     starts += [best_along(records, at, place, N_PLACES_OF_SHAPE if units[place] == "s" else N_PLACES_OF_SHAPE // 8)
-               for place in map(int, np.flatnonzero(free)) for at in (z, rest)]  # fmt: skip
-    return fit_from(records, active, [np.clip(z, 1e-3, 1.0 - 1e-3), *starts], rough=True)
+               for place in map(int, np.flatnonzero(free)) for at in (z, *rests)]  # fmt: skip
+    return [np.clip(z, 1e-3, 1.0 - 1e-3), *starts]
 
 
 def best_along(records: WhiteRecords, z: Array, place: int, n: int = N_PLACES_OF_SHAPE) -> Array:

@@ -173,10 +173,27 @@ def close_loop(
                                if s.kind in TOLD or (is_nameless and s.kind != "unjudged"))  # fmt: skip
     again = [f"Record {s.record} once more, or look at how it was made." for s in suspects if s.kind != "trend"]
     doubt = [] if after.fails_to_carry_over else in_doubt_sentences(after.train, after.holdout)
-    next_steps = (*told_first, *missed_sentences(after.missed), *doubt, *limits_of(after), *dict.fromkeys(again))
+    next_steps = (
+        *otherwise_than(model, inference.exploration.library),
+        *told_first,
+        *missed_sentences(after.missed),
+        *doubt,
+        *limits_of(after),
+        *dict.fromkeys(again),
+    )
     together = known_together(in_force, inference.exploration.library)
     return ClosedLoop(campaign, verdicts[0], verdicts[1:], judged[0], after, steps[:kept], withdrawn, advice,
                       next_steps, together, tuple(suspects), errors, inference, missing)  # fmt: skip
+
+
+def otherwise_than(model: Model, library: Library) -> list[str]:
+    """Say which forms and shapes of a declared model's effects are not those that it takes where none is given."""
+    forms = [f"{new.name} is in its form {new.form}"
+             for old, new in zip(model.effects, library.declared.effects, strict=True) if new != old]  # fmt: skip
+    shapes = [f"{', '.join(library.own_shapes)} is fitted"] if library.own_shapes_free else []
+    if not forms + shapes:
+        return []
+    return [f"Otherwise than by default, as the records are more probable so: {'; '.join(forms + shapes)}."]
 
 
 def doubted(judged: Judgement, why: str) -> Judgement:
