@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from armid.errors import ArmidError, DataError, ModelError, nearest, nearest_registered, quoted
-from armid.model import Array, Effect, Manoeuvre, Model, Plant, fitting_form, refusal_of
+from armid.model import Array, Effect, Manoeuvre, Model, Plant, effect_named, refusal_of
 from armid.model.effects.sensor import sensor_effects
 from armid.model.parameter import warn_if_far
 from armid.progress import announced, search_bar, status_line
@@ -75,8 +75,8 @@ def opened(
         read = replace(read, angle=units)
     effects_known = registry.effects_for(read.plant)
     if model is None:
-        for name in read.effects:
-            chosen(name, {**sensor_effects(read.declared), **effects_known}, "effect")
+        for text in read.effects:
+            chosen(text.partition(":")[0], {**sensor_effects(read.declared), **effects_known}, "effect")
         model = read.model(registry.effects)
     for effect in each_of(effects):
         model = model + effect_of(effect, effects_known, read.plant)
@@ -137,9 +137,9 @@ def effect_of(given: Any, effects: Mapping[str, Effect], plant: Plant) -> Effect
     """Return an effect by its name, in the form of a word or else in the first form that the plant takes."""
     if isinstance(given, Effect):
         return given
-    name, _, form = str(given).strip().partition(":")
-    effect: Effect = chosen(name, effects, "effect")
-    return effect.in_form(form) if form else fitting_form(effect, plant)
+    text = str(given).strip()
+    chosen(text.partition(":")[0], effects, "effect")
+    return effect_named(text, effects, plant)
 
 
 def chosen(name: str, known: Mapping[str, object], what: str) -> Any:

@@ -98,6 +98,8 @@ TOML = {
     "unknown plant": (GOOD.replace("shell_transfer_arm", "shell_transfer_am"),
                       ["campaign.toml", "plant 'shell_transfer_am'", "did you mean 'shell_transfer_arm'"]),
     "effect twice": ('effects = ["coulomb", "coulomb"]\n' + GOOD, ["'coulomb'", "twice"]),
+    "effect twice in two forms": ('effects = ["coulomb", "coulomb:tanh"]\n' + GOOD, ["'coulomb'", "twice"]),
+    "unknown form": ('effects = ["coulomb:tan"]\n' + GOOD, ["campaign.toml", "'coulomb'", "did you mean 'tanh'"]),
     "unknown constant": (GOOD + "[records.constants]\nKp = 1.0", ["'Kp'", "did you mean 'K_p'"]),
     "unknown input": (GOOD + "[records.inputs]\nu = 'drive_V'", ["'u'", "not an input", "there is none"]),
     "restart of an arm": (GOOD + "restart_s = 1.0", ["'lower.csv'", "restart_s", "starts at rest"]),

@@ -4,6 +4,7 @@ In reading order:
 
 infer         the whole way: campaign -> probabilities and intervals
 whitening     train records with their noise -> residuals whose noise is white
+declared      the declared model: its fit, its scales, the shapes and forms of its effects
 library       the candidate effects, compiled together and ready to be tried; `candidates`: their keys and bundles
 hypothesis    what the declared model of the machine and its records may lack
 decisions     prior beliefs, from calibration.toml, and all other numbers that decide

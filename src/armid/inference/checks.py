@@ -128,7 +128,7 @@ class Residuals:
         that changes with the motion. Empty where no sensor rounds, or where the noise is more than that of white ones.
         """
         levels, sensors = self.data.levels, [r.record.signals[0].sensor for r in self.replays]
-        is_white = all(level.is_white and not level.growth for level in levels) and not self.data.inputs_count
+        is_white = all(not (len(level.terms) or level.growth) for level in levels) and not self.data.inputs_count
         if not is_white or not any(s.step for s in sensors):
             return []
         rng, signals = np.random.default_rng(0), [r.signal(self.candidate[np.newaxis])[0] for r in self.replays]
@@ -136,8 +136,10 @@ class Residuals:
         fine = [np.sqrt(max(size**2 - s.rounding**2, 0.0)) for size, s in zip(sizes, sensors, strict=True)]
         draws = []
         for _ in range(N_ROUNDED):
-            errors = [sensor.reading(y + size * rng.standard_normal(len(y)), float(r.measured[0])) - y
-                      for sensor, y, size, r in zip(sensors, signals, fine, self.replays, strict=True)]  # fmt: skip
+            errors = [sensor.counted(y, rng.random()) - y if level.alternation and sensor.step else
+                      sensor.reading(y + size * rng.standard_normal(len(y)), float(r.measured[0])) - y
+                      for level, sensor, y, size, r in zip(levels, sensors, signals, fine, self.replays, strict=True)
+                      ]  # fmt: skip
             draws.append(self.without_memory(self.data.white(errors)))
         return draws
 
@@ -464,14 +466,15 @@ def band_tests(seen: Residuals) -> Iterator[Finding]:
     rests = spectra(still, seen, hum) if coloured else {}
     flat = 1.0 if seen.data.sized else float(np.mean(np.concatenate(seen.renewed) ** 2))
     drawn = [] if coloured else [spectra(draw, seen, hum) for draw in seen.rounded]
-    if drawn and not seen.data.sized:
-        flat /= float(np.mean(np.concatenate(list(chain.from_iterable(seen.rounded))) ** 2))
+    mean = float(np.mean(np.concatenate(list(chain.from_iterable(seen.rounded))) ** 2)) if drawn else 1.0
+    shapes = {band: float(np.mean([np.mean(one[band]) for one in drawn])) if drawn else 1.0 for band in left}
+    if not seen.data.sized:  # a sensor that rounds is not the only noise
+        shapes = {band: max(shape / mean, 1.0) for band, shape in shapes.items()}
     for band, values in sorted(left.items()):
         other = rests.get(band, [])
         if coloured and len(other) < FEWEST_ORDINATES:
             continue
-        shape = float(np.mean([np.mean(one[band]) for one in drawn])) if drawn else 1.0
-        against = float(np.mean(other)) if coloured else flat * shape
+        against = float(np.mean(other)) if coloured else flat * shapes[band]
         ratio, free = float(np.mean(values)) / against, 2.0 * INDEPENDENT * len(values)
         known = 2.0 * INDEPENDENT * len(other) if coloured else seen.data.n_noise(otherwise=np.inf)
         high = BANDS_HZ[band + 1]

@@ -1,56 +1,57 @@
 """Infer what a declared model lacks: the models that the train records ask for, and how probable each is."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence, Set
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property, partial
+from functools import cache, cached_property
 from math import comb
-from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from armid.engine import along
 from armid.errors import ArmidError, nearest
 from armid.estimation.constants import NAMED
 from armid.estimation.corrections import rms
 from armid.estimation.information import NORMAL_95
 from armid.estimation.input_noise import estimated, pooled_noise
-from armid.estimation.least_squares import Estimates, descend, held_by_bound, spread_starts, with_fitted_starts
+from armid.estimation.least_squares import Estimates, with_fitted_starts
 from armid.estimation.noise_model import NoiseModel, levels_in_motion, levels_left
 from armid.inference.candidates import constant_effects
 from armid.inference.carry_over import predicting_best
 from armid.inference.checks import is_significant, train_residuals
 from armid.inference.decisions import LISTED, calibration
+from armid.inference.declared import (
+    declared_again,
+    in_form,
+    likelier_form,
+    schwarz,
+    with_fitting_forms,
+    with_fitting_shapes,
+    with_scales,
+)
 from armid.inference.evidence import expansion_of
 from armid.inference.hypothesis import Hypotheses, Hypothesis
 from armid.inference.kinds.effects import least_waves
 from armid.inference.kinds.same_law import doubles
 from armid.inference.library import Library, library_of
-from armid.inference.model import ROUGHLY, Fit, accurate, fit_from, start_of, unless_diverged, with_own_shapes
+from armid.inference.model import Fit, accurate, fit_from, start_of
 from armid.inference.moves import Exploration
 from armid.inference.posterior import CONSTANTS_TEXT, Posterior, posterior, spread
 from armid.inference.search import explore, without_denied
 from armid.inference.unknowns import freed
-from armid.inference.whitening import WhiteRecords, whitened, with_answers
-from armid.model import EFFECTS, Array, Effect, Model, refusal_of
+from armid.inference.whitening import whitened, with_answers
+from armid.model import EFFECTS, Effect, Model
 from armid.model.effects.sensor import sensor_effects
 from armid.problem.space import Space
 from armid.record import Campaign
 
-# Returns the library with another noise, where an inference shows it, else the library as it is.
-ChangeOfNoise = Callable[[Library, "Inference"], Library]
+# Returns the library with another noise or form, where an inference shows it, else the library as it is.
+Change = Callable[[Library, "Inference"], Library]
 # By which factor strengths that scale with the machine may exceed their declared range.
 REACH_OF_STRENGTHS = 16.0
-# A declared effort within this factor of the largest one at the declared fit stays: a scale is an order of magnitude.
-SAME_ORDER = 2.0
-# How often a range becomes wider whose end holds a parameter.
-MOST_WIDENED = 4
 # Share of what a model leaves, below which noise of the inputs is a trifle: a thousandth of its square. What ends near
 # it is judged again with that noise.
 TRIFLE = 0.03
-# Shares of each record to which a first estimate is carried on.
-GROWING = (0.125, 0.25, 0.5, 0.75)
 # Names in the sentence that leads, and constants that are named as a cause of an interval's width.
 MOST_LEADING, MOST_CONSTANTS = 5, 3
 
@@ -292,32 +293,19 @@ def prepared(
     chances = {**campaign.chances, **(priors or {})}
     known = {name: (one.mean, one.sd) for name, one in campaign.known.items()}
 
-    def fitted(model: Model, alone: bool = False) -> tuple[Library, Fit]:
-        library = library_of(model, candidates, data, campaign.parameters, bounds or {}, fixed or {}, threads, told,
-                             within)  # fmt: skip
-        bundles = () if alone else library.bundles
-        library = replace(library, reach=REACH_OF_STRENGTHS, priors=chances, known=known, bundles=bundles)
-        problem = library.problem(())
-        library = library.about(with_fitted_starts(problem.replays, problem.space))
-        return with_fitting_shapes(*with_noise(*with_scales(library)))
-
-    def fit_alone(model: Model) -> Fit:
-        return fitted(model, alone=True)[1]
-
-    exact, declared = fitted(model)
-    given = {*(bounds or {}), *(fixed or {})}
-    while True:
-        fits = [(form, unless_diverged(partial(fit_alone, form))) for form in other_forms(exact.declared, given)]
-        # another form is charged as a parameter is
-        likelier = [(schwarz(fit, more=1), form) for form, fit in fits
-                    if fit is not None and schwarz(fit, more=1) > schwarz(declared)]  # fmt: skip
-        if not likelier:
-            break
-        exact, declared = fitted(max(likelier, key=itemgetter(0))[1])
+    library = library_of(model, candidates, data, campaign.parameters, bounds or {}, fixed or {}, threads, told, within)
+    library = replace(library, reach=REACH_OF_STRENGTHS, priors=chances, known=known)
+    problem = library.problem(())
+    library = library.about(with_fitted_starts(problem.replays, problem.space))
+    exact, declared = with_fitting_forms(*with_noise(*with_scales(library)))
     library = with_input_noise(exact, declared)
     declared = declared if library is exact else declared_again(library, declared)
-    library = replace(library, doubles=doubles(declared, library), least_waves=least_waves(declared), _problems={})
-    return library, declared
+    return searched(library, declared), declared
+
+
+def searched(library: Library, declared: Fit) -> Library:
+    """Return the library with what of it the fit of its declared model leaves out of a search."""
+    return replace(library, doubles=doubles(declared, library), least_waves=least_waves(declared), _problems={})
 
 
 def infer(library: Library, declared: Fit) -> Inference:
@@ -325,12 +313,13 @@ def infer(library: Library, declared: Fit) -> Inference:
 
     Each hypothesis (an effect, a fault of one record, a drift, a signal without a form) is a block of further unknowns
     with a prior, or a covariance. Models are explored in Occam's window; `evidence` says how one gets its probability.
-    All is repeated with another noise, each at most once, where the records are more probable so: `CHANGES_OF_NOISE`.
+    All is repeated with another noise, or form of a declared effect, where the records are more probable so: `CHANGES`,
+    each at most once.
     """
-    return inferred(library, declared, CHANGES_OF_NOISE)
+    return inferred(library, declared, CHANGES)
 
 
-def inferred(library: Library, declared: Fit, changes: Sequence[ChangeOfNoise]) -> Inference:
+def inferred(library: Library, declared: Fit, changes: Sequence[Change]) -> Inference:
     """Return an inference, with the first of some changes of the noise that it asks for, and those after it.
 
     Noise of the inputs counts from the first leading model on that may show it: what it does looks like many effects.
@@ -349,8 +338,14 @@ def inferred(library: Library, declared: Fit, changes: Sequence[ChangeOfNoise]) 
     inference = Inference(exploration, posterior(exploration))
     for change in changes:
         other = change(library, inference)
-        if other is not library:
-            return inferred(other, declared_again(other, declared), [c for c in changes if c is not change])
+        if other is library:
+            continue
+        if other.declared is library.declared:
+            again = declared_again(other, declared)
+        else:
+            other, again = with_fitting_shapes(*with_scales(other))
+            other = searched(other, again)
+        return inferred(other, again, [c for c in changes if c is not change])
     return inference
 
 
@@ -423,87 +418,6 @@ def moved_and_left(library: Library, fit: Fit) -> list[tuple[NoiseModel, float]]
     return [(level, rms(left)) for level, left in pairs]
 
 
-def declared_again(library: Library, declared: Fit) -> Fit:
-    """Return the declared model fitted to other data of the same records."""
-    return accurate(fit_from(library.problem(()), (), [declared.z]), library)
-
-
-def declared_fit(library: Library) -> Fit:
-    """Return the declared model at its estimate, from starts over the box and one that grew with the records."""
-    problem = library.problem(())
-    starts = [*spread_starts(problem), grown_start(problem)] if problem.space.free.any() else ()
-    return accurate(fit_from(problem, (), starts), library)
-
-
-def grown_start(problem: WhiteRecords) -> Array:
-    """Return the estimate of the beginning of each record, carried on to ever longer parts, as shares of the range.
-
-    A motion that may go over the top has many minima over a long time, and few at its beginning.
-    """
-    first, *longer = map(problem.beginning, GROWING)
-    z = descend(first, spread_starts(first), ROUGHLY)
-    for part in longer:
-        z = descend(part, [z], ROUGHLY)
-    return z
-
-
-def with_scales(library: Library) -> tuple[Library, Fit]:
-    """Return the library with the sizes that the declared fit shows, and that fit.
-
-    The drive's column is in volts or a duty where the gain is a free parameter: the scale of effort is the largest
-    effort of the drive at the declared fit. A parameter of the declared model that sits at the end of its
-    declared range, which is a multiple of the machine's scales, gets a wider one; a range that the user gave stays.
-    """
-    of_machine = library.scaled_strengths | library.scaled_by_plant
-    fit = declared_fit(library)
-    scaled = rescaled(library, fit)
-    if scaled is not library:
-        library, fit = scaled, declared_fit(scaled)
-    for _ in range(MOST_WIDENED):
-        held = set(np.array(list(fit.values))[held_by_bound(fit.records.space, fit.x)].tolist())
-        own = {n for n in held & of_machine if library.owner(n) is None and abs(fit.values[n]) > 0.0}
-        if not own:
-            break
-        space = fit.records.space.with_wider(own)
-        wider = {n: (float(space.low[space.index(n)]), float(space.high[space.index(n)])) for n in own}
-        library = replace(library, widened={**library.widened, **wider}, _problems={})
-        fit = declared_fit(library)
-    return library, fit
-
-
-def other_forms(model: Model, given: Set[str]) -> Iterator[Model]:
-    """Yield a model with each of its effects that is in the first of its forms in each other one.
-
-    A user who declares friction knows that it is there, and seldom its form. given: parameters that the user bounds or
-    fixes, which the other form has to have.
-    """
-    for effect in model.effects:
-        wanted = {name for name in given if name.startswith(f"{effect.name}.")}
-        for form in effect.searched_forms[1:]:
-            if wanted <= {f"{form.name}.{p.name}" for p in form.parameters} and not refusal_of(form, model.plant):
-                yield replace(model, effects=tuple(form if e is effect else e for e in model.effects))
-
-
-def schwarz(fit: Fit, more: int = 0) -> float:
-    """Return how probable the records are by a fit, its parameters and some more charged.
-
-    Schwarz 1978, doi:10.1214/aos/1176344136.
-    """
-    return fit.log_density - 0.5 * (fit.n_free + more) * float(np.log(len(fit.residual)))
-
-
-def with_fitting_shapes(library: Library, declared: Fit) -> tuple[Library, Fit]:
-    """Return the library with the shapes of the declared model's effects free where the records deny those it fixes.
-
-    The width over which a sign is smoothed is no knowledge of the user; what a wrong one leaves looks like an effect.
-    """
-    if not library.own_shapes:
-        return library, declared
-    free = replace(library, own_shapes_free=True, _problems={})
-    wide = unless_diverged(lambda: with_own_shapes(declared, free))
-    return (library, declared) if wide is None or schwarz(wide) <= schwarz(declared) else (free, wide)
-
-
 def with_noise(library: Library, declared: Fit) -> tuple[Library, Fit]:
     """Return the library with the noise that the declared fit shows where no rest tells it, and that fit."""
     if library.data.known:
@@ -564,23 +478,20 @@ def with_measured_inputs(library: Library, fit: Fit) -> Library:
 
 
 # In this order: inputs that are wrongly taken for noisy, or for exact, look like noise in motion.
-CHANGES_OF_NOISE: tuple[ChangeOfNoise, ...] = (with_exact_inputs, with_answering_inputs, with_noise_in_motion)
+def with_likelier_form(library: Library, inference: Inference) -> Library:
+    """Return the library with a declared effect in another form, if the model in force is more probable so.
+
+    Far from the noise a form that is wrong may do as well as the right one.
+    """
+    if not (inference.in_force or inference.posterior.unknown_is_likely):
+        return library
+    fit = inference.exploration.fits[inference.in_force]
+
+    def fitted(other: Library) -> Fit:
+        return fitted_to(replace(other, own_shapes_free=library.own_shapes_free), fit, inference)
+
+    form = likelier_form(library, schwarz(fit), fitted)
+    return library if form is None else in_form(library, form)
 
 
-def rescaled(library: Library, declared: Fit) -> Library:
-    """Return the library with the effort scale of the declared fit, where the plant takes its scales from records."""
-    plant, model = library.declared.plant, declared.model
-    if not plant.scales_from_records or "drive_effort" not in plant.quantities:
-        return library
-    largest = 0.0
-    for replay in declared.records.replays:
-        for piece, schedule in zip(replay.pieces, (c.schedule for c in replay.calibrations), strict=True):
-            effort = along(model, piece.manoeuvre, declared.candidate, schedule, ["drive_effort"])
-            largest = max(largest, float(np.nanmax(np.abs(effort["drive_effort"]), initial=0.0)))
-    if not np.isfinite(largest) or largest <= 0.0 or 1.0 / SAME_ORDER < largest / plant.scales.effort < SAME_ORDER:
-        return library
-    scaled = replace(plant, scales=replace(plant.scales, effort=largest))
-    own = {n: (p.low, p.high) for n, p in library.declared.parameters.items()
-           if p.fixed is None and "." not in n and n not in {*library.overrides, *library.fixed}}  # fmt: skip
-    return replace(library, declared=replace(library.declared, plant=scaled), bounds={**own, **library.bounds},
-                   _models={}, _problems={})  # fmt: skip
+CHANGES: tuple[Change, ...] = (with_exact_inputs, with_answering_inputs, with_noise_in_motion, with_likelier_form)

@@ -61,9 +61,11 @@ class Library:
     strengths of the declared model that were too narrow. doubles: effects that are the law of a free parameter of the
     declared model, or of a constant within its tolerance. least_waves: smallest wave number of a candidate that repeats
     with position. own_shapes_free: whether the shapes of the declared model's effects, which it fixes, are free.
+    as_declared: the declared model with its effects in the forms that the user gave.
     """
 
     declared: Model
+    as_declared: Model
     candidates: Mapping[EffectKey, Effect]
     data: WhitenedData
     bundles: tuple[Active, ...]
@@ -350,7 +352,7 @@ def library_of(
         names = {f"{k.compiled}.{p.name}": f"{k.name}.{p.name}" for k, e in applicable.items() for p in e.parameters}
         return dict(given) | {own: given[public] for own, public in names.items() if public in given}
 
-    return Library(declared, applicable, data, bundled(declared, applicable), for_each_form(overrides),
+    return Library(declared, declared, applicable, data, bundled(declared, applicable), for_each_form(overrides),
                    for_each_form(bounds), for_each_form(fixed), threads, say, tolerances or {})  # fmt: skip
 
 

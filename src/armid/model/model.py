@@ -116,6 +116,12 @@ def refusal_of(effect: Effect, plant: Plant) -> str:
     return ""
 
 
+def effect_named(text: str, known: Mapping[str, Effect], plant: Plant) -> Effect:
+    """Return the effect of a text, NAME or NAME:FORM; without a word, the first form that the plant takes."""
+    name, _, form = text.partition(":")
+    return known[name].in_form(form) if form else fitting_form(known[name], plant)
+
+
 def fitting_form(effect: Effect, plant: Plant) -> Effect:
     """Return the first form of an effect that a plant takes, the effect itself where it takes none."""
     return next((form for form in effect.searched_forms if not refusal_of(form, plant)), effect)

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from armid.errors import ArmidError, DataError, caused_by, nearest, quoted
-from armid.model import EFFECTS, PLANTS, Array, Effect, Model, Output, Parameter, Plant, fitting_form
+from armid.errors import ArmidError, DataError, caused_by, located, nearest, quoted
+from armid.model import EFFECTS, PLANTS, Array, Effect, Model, Output, Parameter, Plant, effect_named
 from armid.model.effects.sensor import sensor_effects
 from armid.model.parameter import resolve, warn_if_far
 from armid.record.reader import CAMPAIGN_FILE, CSV_SUFFIX, campaign_path, gravity_of, record_of, record_path
@@ -119,7 +119,7 @@ class Campaign(Shown):
         Raises ModelError where they do not compose.
         """
         known = {**sensor_effects(self.declared), **(EFFECTS if effects is None else effects)}
-        return Model(self.plant, tuple(fitting_form(known[name], self.plant) for name in self.effects))
+        return Model(self.plant, tuple(effect_named(text, known, self.plant) for text in self.effects))
 
     @caused_by(DataError)
     def with_window(self, begin: float, end: float) -> "Campaign":
@@ -190,6 +190,19 @@ def as_toml(value: Any) -> Any:
     return [*map(as_toml, value)] if isinstance(value, list | tuple) else getattr(value, "item", lambda: value)()
 
 
+def refuse_effects(texts: Sequence[str], known: Mapping[str, Effect], where: str) -> None:
+    """Refuse effects, NAME or NAME:FORM, that are unknown, and one that is given twice."""
+    names = [text.partition(":")[0] for text in texts]
+    for i, (name, text) in enumerate(zip(names, texts, strict=True)):
+        if name not in known:
+            raise unknown_name("effect", name, known, where)
+        if ":" in text:
+            with located(where):
+                known[name].in_form(text.partition(":")[2])
+        if name in names[:i]:
+            raise ArmidError(f"{where}: effect '{name}' is declared twice, each effect once is expected")
+
+
 def campaign_of(
     given: Mapping[str, Any], source: Callable[[str, str], Callable[[float | None], CsvTable]], folder: Path,
     where: str, plants: Mapping[str, Plant] | None, effects: Mapping[str, Effect] | None,
@@ -202,11 +215,7 @@ def campaign_of(
     if sheet.plant not in plants:
         raise unknown_name("plant", sheet.plant, plants, where)
     effects = {**sensor_effects(plants[sheet.plant]), **(EFFECTS if effects is None else effects)}
-    for i, name in enumerate(sheet.effects):
-        if name not in effects:
-            raise unknown_name("effect", name, effects, where)
-        if name in sheet.effects[:i]:
-            raise ArmidError(f"{where}: effect '{name}' is declared twice, each effect once is expected")
+    refuse_effects(sheet.effects, effects, where)
     declared = plants[sheet.plant]
     chances, known = priors_of(sheet.priors, declared, effects, where)
     sheet = with_known_constants(sheet, known, declared, where)

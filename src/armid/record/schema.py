@@ -215,7 +215,9 @@ LOST = key(share, "a share from 0 to below 1", "Share of a record that may be in
 INPUTS = key(table_of(text), "the name of a column", "Which column of the CSV file brings an input of the plant.")
 WINDOW_KEY = key(list_of(number, 2, 2), "[begin, end] in seconds", "Part of the record that fitness and errors see.")
 EFFECTS_KEY = key(
-    list_of(name_in("effects")), "a list of names of effects", "Effects that the model adds to the plant."
+    list_of(name_in("effects")),
+    "a list of names of effects",
+    "Effects that the model adds to the plant; NAME takes the first form that fits, NAME:FORM another.",
 )
 PLANT = key(name_in("plants"), "the name of a plant", "The declared machine; `armid list plants` shows them.")
 

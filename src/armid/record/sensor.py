@@ -70,6 +70,11 @@ class Sensor:
         """Return values as the sensor rounds them; known: one of its readings [unit of the output]."""
         return known + np.round((values - known) / self.step) * self.step if self.step else values
 
+    def counted(self, values: Array, begin: float) -> Array:
+        """Return a speed as the differences of its counts; begin: share of a count that has passed before."""
+        counts = np.floor(np.cumsum(values) / self.step + begin)
+        return np.asarray(self.step * np.diff(counts, prepend=0.0))
+
 
 def sensor_of(values: Array) -> Sensor:
     """Return the sensor of the values of one output as they were read, (n_rows,)."""

@@ -145,8 +145,10 @@ def _campaign_case(
     campaign = _with_records(read_campaign(path, registry.plants, registry.effects), entry.records, where)
     if campaign.plant.name not in {v.name for v in registry.plants[spec.plant].variants} | {spec.plant}:
         raise ArmidError(f"{where}: the campaign is of plant '{campaign.plant.name}', '{spec.plant}' is expected")
-    further = [name for name in dict.fromkeys(spec.effects) if name not in campaign.effects]
-    model = registry.with_effects(campaign.model(registry.effects), further, where)
+    declared = campaign.model(registry.effects)
+    there = {effect.name for effect in declared.effects}
+    further = [text for text in dict.fromkeys(spec.effects) if text.partition(":")[0] not in there]
+    model = registry.with_effects(declared, further, where)
     space = _space(model, campaign.parameters, spec, entry, where)
     for window in spec.windows_s:
         if not isinstance(window, str):
