@@ -108,6 +108,25 @@ def test_force_mass_and_friction_that_grow_alike_are_not_told_apart_by_sharp_fri
         assert estimate.low < truth < estimate.high
 
 
+def test_form_and_width_of_declared_friction_are_fitted_and_no_other_effect_stands_in_for_them(tmp_path):
+    rng, toml = np.random.default_rng(8), 'name = "axis"\nplant = "driven_axis"\nhold = "zero"\neffects = ["coulomb"]\n'
+    records = {f"r{i}.csv": table for i, table in enumerate(tables(rng))}
+    made = read_campaign(write_records(tmp_path / "made", toml.replace("coulomb", "coulomb:tanh"), records, holdout=0))
+    width = 0.3 * made.model().parameters["coulomb.width"].fixed
+    motion = armid.simulate(made, parameters={"mass": MASS, "coulomb.level": LEVEL, "coulomb.width": width})
+    for file, table in records.items():
+        speed = motion.tables[file]["velocity_m_s"]
+        table["velocity_m_s"] = speed + SMALL_NOISE * rng.standard_normal(len(speed))
+    declared = read_campaign(write_records(tmp_path / "declared", toml, records, holdout=0))
+    found = close_loop(declared.model(), declared, {n: EFFECTS[n] for n in ("stribeck", "torque_offset", "presliding")})
+    assert (found.verdict, found.steps) == ("no_discrepancy", ())
+    (sentence,) = (s for s in found.next_steps if s.startswith("Otherwise than by default"))
+    assert "coulomb is in its form tanh; coulomb.width is fitted" in sentence
+    values = found.parameters
+    assert values["coulomb.width"] == pytest.approx(width, rel=0.05)
+    assert values["coulomb.level"] == pytest.approx(LEVEL, rel=0.01)
+
+
 def test_dry_friction_of_the_machine_is_not_looked_for_and_improbable_in_another_form(tmp_path):
     """Two smoothed signs are one friction, but an offset or presliding is another law."""
     rng, toml = np.random.default_rng(3), 'name = "axis"\nplant = "driven_axis"\nhold = "zero"\n'

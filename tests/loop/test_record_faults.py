@@ -8,16 +8,18 @@ import numpy as np
 import pytest
 from few_candidates import CANDIDATES, COMMON, TRUTH
 
+import armid
 from armid.inference.checks import mains_hum
 from armid.inference.kinds.faults import Fault
 from armid.loop import close_loop, report_of
 from armid.loop.document import conclusion
 from armid.loop.result import RecordFault, fault_sentence
-from armid.model import PLANTS, Model
+from armid.model import EFFECTS, PLANTS, Model
 from armid.record import RecordWarning, read_campaign, write_table
 from armid.record.sensor import noise_of
 from armid.record.table import read_table
 from changed_records import trimmed
+from synthetic import write_records
 
 pytestmark = pytest.mark.slow
 ARM = PLANTS["shell_transfer_arm"]
@@ -120,6 +122,30 @@ def test_a_parameter_that_rises_from_record_to_record_is_told(stand, campaign):
     assert found.after.train.errors.rmse < 1.05 * found.noise_rms
     for e in found.after.estimates[:4]:
         assert e.low < TRUTH[e.name] < e.high
+
+
+def test_a_large_change_in_one_record_is_undone_as_a_motion_answers_to_it(tmp_path):
+    """A joint that swings far: what a change does depends on all other parameters."""
+    rng, times, tables = np.random.default_rng(5), 0.004 * np.arange(1000), {}
+    for file in ("a.csv", "b.csv", "c.csv", "d.csv"):
+        current = np.repeat(rng.choice([-1.0, 1.0], 40), 25) * (times > 0.4) * rng.uniform(0.2, 0.3)
+        tables[file] = {"time_s": times, "current_A": current, "angle_rad": np.cumsum(current)}
+    head = 'name = "joint"\nplant = "rotary_arm"\nhold = "zero"\n[parameters.gain]\nfixed = 0.4\n'
+    made = read_campaign(write_records(tmp_path / "made", head, tables))
+    truth = {"inertia": 0.02, "gravity_moment": 0.06, "damping": 0.012}
+    for file, table in tables.items():
+        own = truth | ({"inertia": 0.0225} if file == "c.csv" else {})
+        angle = armid.simulate(made, parameters=own).tables[file]["angle_rad"]
+        table["angle_rad"] = angle + 5e-4 * rng.standard_normal(len(angle))
+    there = read_campaign(write_records(tmp_path / "there", head, tables))
+    found = close_loop(there.model(), there, {n: EFFECTS[n] for n in ("coulomb", "position_spring", "drive_gain")})
+    assert (found.verdict, found.also, found.steps) == ("record_disagrees", (), ())
+    (suspect,) = report_of(found)["suspects"]
+    assert (suspect["record"], suspect["kind"], suspect["parameter"]) == ("c.csv", "parameter", "inertia")
+    assert suspect["low"] < 0.0025 < suspect["high"]
+    assert suspect["high"] - suspect["low"] < 1e-4
+    for estimate in (e for e in found.after.estimates if e.name in truth):
+        assert estimate.low < truth[estimate.name] < estimate.high
 
 
 def test_a_parameter_that_is_another_in_one_record_is_told(stand, campaign):

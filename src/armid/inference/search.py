@@ -337,7 +337,7 @@ def finish_all(exploration: Exploration) -> None:
             complete(exploration, model)
     weight, top = exploration.scale().weight, exploration.ranked()[0][1]
     for model in [m for m, value in exploration.ranked()[:BEAM] if value > top - WINDOW]:
-        exploration.fits[model] = drifts.taken_anew(model, polished(exploration.fits[model], weight), weight)
+        exploration.fits[model] = polished(exploration.fits[model], weight)
 
 
 def may_be_far_off(exploration: Exploration, model: Hypotheses) -> bool:

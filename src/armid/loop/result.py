@@ -414,17 +414,15 @@ def fault_of(hypothesis: Hypothesis, fit: Fit, inference: Inference) -> RecordFa
 
 def change_of(hypothesis: Hypothesis, fit: Fit, inference: Inference) -> RecordFault:
     what: OfParameter = hypothesis.means
-    undone: Any = next(f.unknown.moved for f in fit.others if f.unknown.name == hypothesis.size_name)
-    factor, unit, kind = undone.reach, "of its value", "parameter" if what.file else "trend"
-    if what.product is None:
-        place = list(fit.values).index(what.name)
-        factor, unit = factor * float(fit.records.span[place]), fit.model.parameters[what.name].unit
+    change: Any = next(f.unknown.moved for f in fit.others if f.unknown.name == hypothesis.size_name)
+    unit = "of its value" if what.product is not None else fit.model.parameters[what.name].unit
+    kind = "parameter" if what.file else "trend"
     record = next((r for r in fit.records.data.records if r.file == what.file), fit.records.data.records[-1])
     likely = inference.posterior.of_kind(hypothesis.kind)
     mine = {h.name: h.means for h in inference.exploration.drifts if h.kind == hypothesis.kind}
     others = [mine[n].name for n, p in likely.items()
               if n in mine and mine[n].file == what.file and n != hypothesis.name and p >= AS_WELL]  # fmt: skip
-    size = size_of(hypothesis, factor, unit, fit, inference)
+    size = size_of(hypothesis, change.reach, unit, fit, inference)
     names = ", ".join(name.removeprefix(NAMED) for name in (what.name, *others))
     return RecordFault(record.file, record.role, kind, FREED, *size, parameter=names)
 

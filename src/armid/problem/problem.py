@@ -1,7 +1,7 @@
 """Identification as a problem on which any algorithm of pymoo can work."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any, TypeVar
@@ -22,12 +22,16 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, eq=False)
 class ReadyRecord:
-    """Simulate the pieces of one record, each until the end of its window, on its own calibrated schedule."""
+    """Simulate the pieces of one record, each until the end of its window, on its own calibrated schedule.
+
+    changes: parameters that are larger in this record, name -> by how much, SI.
+    """
 
     record: Record
     model: Model
     calibrations: tuple[Calibration, ...]
     threads: int = 1
+    changes: Mapping[str, float] = field(default_factory=dict)
 
     def runs(self, candidates: Array, shares: Mapping[str, Array] | None = None) -> list[Simulation]:
         """Return the simulation of each piece with whole candidates, its start corrected where it is fitted.
@@ -38,7 +42,15 @@ class ReadyRecord:
 
     def simulated(self, candidates: Array, shares: Mapping[str, Array] | None = None) -> list[Simulation]:
         """Return what `runs` does, from the starts that the pieces have."""
+        return self.simulated_as(self.own(candidates), shares)
+
+    def simulated_as(self, candidates: Array, shares: Mapping[str, Array] | None = None) -> list[Simulation]:
+        """Return what `simulated` does of candidates that hold the changes of their record."""
         return [p.run(candidates, self.threads, p.moved_constants(shares) if shares else None) for p in self.prepared]
+
+    def own(self, candidates: Array) -> Array:
+        """Return whole candidates, (..., n_parameters), with the changes of this record."""
+        return np.asarray(candidates + [self.changes.get(name, 0.0) for name in self.model.parameters])
 
     def corrected(self, runs: Sequence[Simulation]) -> list[Simulation]:
         """Return the simulation of each piece with its start corrected where it is fitted."""
@@ -47,7 +59,7 @@ class ReadyRecord:
 
     @property
     def simulates(self) -> tuple[int, ...]:
-        """What its simulations depend on: records that share it differ in what was measured alone."""
+        """What its simulations depend on, except its changes: records that share it differ in what was measured."""
         pairs = zip(self.record.pieces, self.calibrations, strict=True)
         return tuple(id(each) for piece, c in pairs for each in (piece.manoeuvre, c))
 
@@ -213,7 +225,8 @@ def signals_of_each(
 ) -> list[list[Array]]:
     """Return what `signals_of` does for several forms of the same records, of each its rows of the candidates.
 
-    A record that differs in what was measured alone is simulated once for all forms, its candidates side by side.
+    A record that differs in what was measured, or in its changes, is simulated once for all forms, its candidates side
+    by side.
     """
     simulations: dict[int, dict[ReadyRecord, list[Simulation]]] = {i: {} for i in range(len(forms))}
     for alike in zip(*(by_record(form) for form, _ in forms), strict=True):
@@ -222,11 +235,12 @@ def signals_of_each(
             groups.setdefault(ready.simulates, []).append(i)
         for members in groups.values():
             rows = np.concatenate([forms[i][1] for i in members])
-            runs = alike[members[0]].simulated(candidates[rows], {n: share[rows] for n, share in shares.items()})
+            own = np.concatenate([alike[i].own(candidates[forms[i][1]]) for i in members])
+            runs = alike[members[0]].simulated_as(own, {n: share[rows] for n, share in shares.items()})
             edges = np.cumsum([0, *(len(forms[i][1]) for i in members)])
             for i, (first, end) in zip(members, pairwise(edges), strict=True):
-                own = [replace(run, outputs=run.outputs[:, first:end]) for run in runs]
-                simulations[i][alike[i]] = alike[i].corrected(own)
+                mine = [replace(run, outputs=run.outputs[:, first:end]) for run in runs]
+                simulations[i][alike[i]] = alike[i].corrected(mine)
     return [[replay.seen(simulations[i][replay.ready]) for replay in form] for i, (form, _) in enumerate(forms)]
 
 

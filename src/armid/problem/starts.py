@@ -50,7 +50,9 @@ def with_starts(replays: Sequence[Replay], candidate: Array) -> tuple[Replay, ..
 
     def started(ready: ReadyRecord) -> ReadyRecord:
         starts = [Start(ready, k) for k in range(len(ready.record.pieces))]
-        return replace(ready, record=replace(ready.record, pieces=tuple(one.placed(candidate) for one in starts)))
+        return replace(
+            ready, record=replace(ready.record, pieces=tuple(one.placed(ready.own(candidate)) for one in starts))
+        )
 
     return with_each(replays, started)
 

@@ -195,7 +195,7 @@ def refuse_effects(texts: Sequence[str], known: Mapping[str, Effect], where: str
     names = [text.partition(":")[0] for text in texts]
     for i, (name, text) in enumerate(zip(names, texts, strict=True)):
         if name not in known:
-            raise unknown_name("effect", name, known, where)
+            raise unknown_name("effect", text, known, where)
         if ":" in text:
             with located(where):
                 known[name].in_form(text.partition(":")[2])

@@ -5,17 +5,16 @@ from functools import partial
 
 import numpy as np
 
-from armid.estimation.constants import NAMED, Product
+from armid.estimation.constants import NAMED, Product, moved_record
 from armid.inference.decisions import calibration
 from armid.inference.evidence import Expansion, Forecast
-from armid.inference.hypothesis import Hypotheses, Hypothesis, Proposal
-from armid.inference.kinds.faults import simulated_file, with_measured
+from armid.inference.hypothesis import Hypothesis, Proposal
 from armid.inference.library import Library
-from armid.inference.model import ROUGHLY, UNTOLD, Fit, free_values, unless_diverged
-from armid.inference.unknowns import Unknown, freed, polished
+from armid.inference.model import Fit, unless_diverged
+from armid.inference.unknowns import Unknown, freed
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array
-from armid.problem.starts import fits_starts
+from armid.problem.problem import ReadyRecord, with_each
 
 # Fewest record files for a drift to be considered: with fewer a drift is a change in one record. Of two records
 # either may be the other one.
@@ -23,10 +22,6 @@ FEWEST_RECORDS, FEWEST_OTHERS = 4, 2
 # Its largest plausible size, as a share of the constant, of a parameter that keeps its sign, or of the range of one
 # that does not; prior deviations as shares of that.
 LARGEST_DRIFT, SCALES_OF_DRIFT = 0.5, np.array([0.01, 0.03, 0.1, 0.3, 1.0])
-# How often its effect is taken anew, about the estimate of the fit before.
-MOST_TURNS = 8
-# Smallest size about which its effect is taken: of smaller ones rounding would speak.
-LEAST_SIZE = 0.01
 
 
 @dataclass(frozen=True)
@@ -53,43 +48,40 @@ class OfParameter:
             return np.array([float(file == self.file) for file in files])
         return np.arange(len(files)) / (len(files) - 1.0) - 0.5
 
-    def undone(self, fit: Fit, size: float) -> "Undone":
-        """Return what takes the change out of records, taken about a fit and a size of it."""
-        records = fit.base or fit.records
-        firsts, changes = [i for i, replay in enumerate(records.replays) if replay.index == 0], []
-        at, names, reach = records.shares(free_values(records, fit.values)), records.space.free_names, self.reach(fit)
-        for weight, index in zip(self.weights(records), firsts, strict=True):
-            if weight == 0.0:
-                continue
-            share = size * reach * weight * np.array([0.0, 0.5, 1.0])
-            Z, shares = np.tile(at, (3, 1)), {name: np.full(3, off) for name, off in fit.constants.items()}
-            if self.product is not None:
-                name = self.product.names[0]
-                shares[name] = (1.0 + fit.constants.get(name, 0.0)) * (1.0 + share) - 1.0
-            else:
-                Z += np.outer(share, [name == self.name for name in names])
-            changes.append((index, tuple(x[0] - x[1:] for x in simulated_file(records, index, Z, shares))))
-        return Undone(size, reach, tuple(changes))
+    def change(self, fit: Fit) -> "Change":
+        """Return what moves records by the change, as it is about a fit."""
+        reach = self.reach(fit)
+        if self.product is not None:
+            return Change(self.product.names[0], True, reach, self.weights(fit.records))
+        span = float(fit.records.span[list(fit.values).index(self.name)])
+        return Change(self.name, False, reach * span, self.weights(fit.records))
 
 
 @dataclass(frozen=True, eq=False)
-class Undone:
-    """Return records as they would be without a change: a parabola through none, a half and a whole.
+class Change:
+    """Return records in which a parameter or constant is another.
 
-    size: of the whole. reach: largest plausible size, see `OfParameter.reach`. changes: of each file its index, and of
-    each of its signals what a half and the whole change, (2, n_samples).
+    reach: its largest plausible change, SI; of a constant as a share of its value. weights: how much of it each file
+    has, (n_files,).
     """
 
-    size: float
+    name: str
+    is_constant: bool
     reach: float
-    changes: tuple[tuple[int, tuple[Array, ...]], ...]
+    weights: Array
 
     def __call__(self, records: WhiteRecords, value: float) -> WhiteRecords:
-        share, undone = value / self.size, records
-        weights = np.array([4.0 * share * (1.0 - share), share * (2.0 * share - 1.0)])
-        for index, changes in self.changes:
-            undone = with_measured(undone, index, [weights @ change for change in changes])
-        return undone
+        ready = list(dict.fromkeys(replay.ready for replay in records.replays))
+        new = {old: self.changed(old, value * self.reach * weight)
+               for old, weight in zip(ready, self.weights, strict=True)}  # fmt: skip
+        return replace(records, replays=with_each(records.replays, lambda old: new[old]))
+
+    def changed(self, ready: ReadyRecord, size: float) -> ReadyRecord:
+        if size == 0.0:
+            return ready
+        if self.is_constant:
+            return replace(ready, record=moved_record(ready.record, ready.model.plant, {self.name: size}))
+        return replace(ready, changes={**ready.changes, self.name: ready.changes.get(self.name, 0.0) + size})
 
 
 def hypotheses(fit: Fit, library: Library) -> list[Hypothesis]:
@@ -123,39 +115,10 @@ def propose(fit: Fit, known: list[Hypothesis]) -> list[Proposal]:
     return proposals
 
 
-def taken_anew(model: Hypotheses, fit: Fit, weight: float) -> Fit:
-    """Return a polished fit with what its changes do taken about its estimate, until that stays.
-
-    Fits whose starts follow them stay as they are, as in `polished`.
-    """
-    changes = {h.size_name: h.means for h in model if isinstance(h.means, OfParameter)}
-    if fit.base is None or fits_starts(fit.base.replays):
-        return fit
-    for _ in range(MOST_TURNS if changes else 0):
-        others = (replace(f, unknown=Unknown(f.unknown.name, changes[f.unknown.name].undone(fit, within(f.value))))
-                  if f.unknown.name in changes else f for f in fit.others)  # fmt: skip
-        before, fit = fit, polished(replace(fit, others=tuple(others)), weight)
-        if abs(before.chi2 - fit.chi2) < UNTOLD:
-            break
-    return fit
-
-
-def within(size: float) -> float:
-    """Return a size about which the effect of a change is taken."""
-    return float(np.copysign(np.clip(abs(size), LEAST_SIZE, 1.0), size))
-
-
 def refit(hypothesis: Hypothesis, fit: Fit, about: Expansion, ahead: Forecast, limit: float) -> Fit | None:
-    """Return the model with a change, fitted about its own estimate until that stays: what it does is taken there."""
-    base, again, weight, size = fit.base or fit.records, fit, about.scale.weight, ahead.best(1)[0][1]
-    others = [f.unknown for f in fit.others if f.unknown.name != hypothesis.size_name]
-    for turn in range(MOST_TURNS):
-        unknown = Unknown(hypothesis.size_name, hypothesis.means.undone(again, within(size)))
-        tried = unless_diverged(lambda: freed(again, base, [*others, unknown], weight, limit, turn == 0))  # noqa: B023
-        if tried is None:
-            return None
-        stays = turn > 1 and abs(tried.chi2 - again.chi2) < max(UNTOLD, ROUGHLY * again.chi2)
-        again, size = tried, tried.others[-1].value
-        if stays:
-            break
-    return again
+    """Return the model with a change, fitted from the size that is forecast."""
+    name = hypothesis.size_name
+    others = [f.unknown for f in fit.others if f.unknown.name != name]
+    unknown = Unknown(name, hypothesis.means.change(fit))
+    base, weight = fit.base or fit.records, about.scale.weight
+    return unless_diverged(lambda: freed(fit, base, [*others, unknown], weight, limit, rough=True))

@@ -91,13 +91,15 @@ def doubles(fit: Fit, library: Library) -> dict[EffectKey, Double]:
 
     fit: of the declared model. Constants are those that are known within a tolerance.
     """
-    own = [*fit.values, *(p.names[0] for p in fit.products(library.tolerances))]
+    # laws are the same whatever the width over which each smooths a sign
+    values = {name: value for name, value in fit.values.items() if name not in library.own_shapes}
+    own = [*values, *(p.names[0] for p in fit.products(library.tolerances))]
     known: dict[int, tuple[States, dict[str, Array]]] = {}
     found: dict[EffectKey, Double] = {}
     for key in library.joinable(()):
         records = records_with(fit, (key,), library)
         if id(records.model) not in known:
-            states = scattered(records, candidate_at(records, fit.values))
+            states = scattered(records, candidate_at(records, values))
             known[id(records.model)] = states, states.changes(own)
         one = double(records, key, *known[id(records.model)], library)
         found |= {key: one} if one else {}
