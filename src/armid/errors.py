@@ -91,7 +91,10 @@ def nearest(word: str, known: Iterable[str]) -> str:
     if close:
         return f"did you mean '{close[0]}'?"
     if len(", ".join(words)) > LONGEST_LIST:
-        return f"known: {', '.join(get_close_matches(word, words, n=3, cutoff=0.0))} and {len(words) - 3} more"
+        # a parameter of the plant has no dot, one of an effect has one
+        alike = [w for w in words if ("." in w) == ("." in word)] or words
+        shown = get_close_matches(word, alike, n=3, cutoff=0.0)
+        return f"known: {', '.join(shown)} and {len(words) - len(shown)} more"
     return f"known: {', '.join(words)}" if words else "there is none"
 
 

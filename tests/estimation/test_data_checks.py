@@ -303,11 +303,12 @@ def test_what_the_declared_model_misses_cannot_be_judged(campaign):
     said = said_of(folder)
     assert len(said) == 1, said
     (sentence,) = said
-    assert sentence.startswith("lower.csv: the declared model, fitted to the train records, misses it by ")
-    assert sentence.endswith("the record or the model may be wrong.")
+    assert sentence.startswith("lower.csv: the declared model, fitted to the train records, leaves ")
+    assert sentence.endswith("look at its columns, and at what the model lacks.")
     read = read_campaign(folder)
     (point,) = [p for p in check_campaign(read, dict(EFFECTS)) if p.name.startswith("plausible")]
     assert (point.name, point.passed, point.sentence) == ("plausible (unjudged)", True, sentence)
+    assert point.unclear
 
 
 def test_check_and_identify_say_it(campaign, run):

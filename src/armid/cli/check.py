@@ -4,6 +4,7 @@ import signal
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from importlib.metadata import requires, version
 from itertools import chain, count
 from pathlib import Path
@@ -61,10 +62,11 @@ def tell_points(title: str, points: "Iterator[ContractPoint]", **about: str) -> 
     say(title)
     entries = []
     for point in chain([first], points):
-        entries.append({"name": point.name, "passed": point.passed, "sentence": point.sentence})
-        say(f"  {'ok  ' if point.passed else 'FAIL'} {point.name}: {point.sentence}")
-    failed = sum(not point["passed"] for point in entries)
-    say(f"{len(entries) - failed} of {len(entries)} points hold")
+        entries.append(asdict(point))
+        say(f"  {'?   ' if point.unclear else 'ok  ' if point.passed else 'FAIL'} {point.name}: {point.sentence}")
+    failed, unclear = sum(not point["passed"] for point in entries), sum(point["unclear"] for point in entries)
+    text = f"{len(entries) - failed - unclear} of {len(entries)} points hold"
+    say(f"{text}, {unclear} cannot be judged: look at it" if unclear else text)
     give(**about, passed=not failed, points=entries)
     if failed:
         sys.exit(1)

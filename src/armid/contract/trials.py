@@ -21,11 +21,12 @@ GRAVITY = 0.4
 
 @dataclass(frozen=True)
 class ContractPoint:
-    """One point of a contract: its name, whether it holds, and what was seen."""
+    """One point of a contract: its name, whether it holds, what was seen, and whether nobody can tell but the user."""
 
     name: str
     passed: bool
     sentence: str
+    unclear: bool = False
 
 
 def check_parameters(parameters: Iterable[Parameter]) -> list[ContractPoint]:

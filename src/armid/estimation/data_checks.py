@@ -98,9 +98,9 @@ def data_issues(campaign: Campaign, model: Model, space: Space) -> tuple[DataIss
         worst = int(np.argmax(errors))
         if not issues and LEFT < errors[worst] < np.inf:
             file = train[worst].file
-            issues = [DataIssue("unjudged", file, f"{file}: the declared model, fitted to the train records, misses it "
-                                f"by {errors[worst]:.3g} times its signal, and no other sign, unit, clock or manoeuvre "
-                                "explains that: the record or the model may be wrong.")]  # fmt: skip
+            issues = [DataIssue("unjudged", file, f"{file}: the declared model, fitted to the train records, leaves "
+                                f"{errors[worst]:.0%} of its signal, and no other sign, unit, clock or manoeuvre "
+                                "explains that: look at its columns, and at what the model lacks.")]  # fmt: skip
     issues += () if issues else begun_elsewhere(trial, train, z)
     files = {s.record for s in issues if s.kind == "time"}
     return (*seen, *(s for s in times if not files & {"", s.record}), *issues)
