@@ -29,9 +29,9 @@ ROOT = Path(__file__).parents[1]
 # Fast tests, or other loops, run the lines of these folders, files and tests too: their slow ones go without the tracer
 # of coverage, which makes them up to twice as long.
 NOT_TRACED = (
-    "bench", "contract", "engine", "identifiers", "model", "problem", "studies", "test_golden_outputs.py",
-    "test_every_snippet_runs_and_every_output_is_true", "test_dask.py", "test_kills.py", "test_input_noise.py",
-    "test_a_mistake_is_named", "test_a_right_campaign_is_not_accused", "test_right_campaigns_are_not_accused",
+    "analyses", "bench", "contract", "engine", "estimation", "identifiers", "model", "problem", "report", "studies",
+    "study", "test_golden_outputs.py",
+    "test_every_snippet_runs_and_every_output_is_true",
     "test_holdout_records_decide_nothing", "test_the_advised_record_tells_apart_and_beats_a_random_one",
     "test_finds_on_one_stroke_what_the_paper_found", "test_another_form_of_an_effect_takes_its_place",
     "test_a_fault_of_one_record_is_told_beside_an_effect", "test_a_fault_that_held_out_records_deny_is_gone_whole",
