@@ -18,13 +18,22 @@ def tanh_torque(omega, level, width):
     return -level * np.tanh(omega / width)
 
 
+def arctan_torque(omega, level, width):
+    """Effort of Coulomb friction, -level 2/pi arctan(omega/width)."""
+    return -level * 2.0 / np.pi * np.arctan(omega / width)
+
+
 DRY_LEVEL = Parameter("level", "effort", 0.0, 0.5, null=0.0, note="friction at any speed")
 coulomb_tanh = Effect(
     name="coulomb", form="tanh", adds={"torque": tanh_torque}, parameters=(DRY_LEVEL, SIGN_WIDTH),
     note="friction of constant size against the motion", source="doi:10.1016/j.triboint.2005.11.014",
 )  # fmt: skip
+coulomb_arctan = replace(
+    coulomb_tanh, form="arctan", adds={"torque": arctan_torque},
+    source="doi:10.1002/(SICI)1096-9845(199705)26:5<541::AID-EQE660>3.0.CO;2-W",
+)  # fmt: skip
 coulomb = Effect(
-    name="coulomb", form="root", forms=(coulomb_tanh,), adds={"torque": coulomb_torque},
+    name="coulomb", form="root", forms=(coulomb_tanh, coulomb_arctan), adds={"torque": coulomb_torque},
     parameters=(DRY_LEVEL, SIGN_WIDTH),
     note="friction of constant size against the motion", source="doi:10.1016/0005-1098(94)90209-7",
 )  # fmt: skip
