@@ -113,7 +113,7 @@ def with_fitting_forms(library: Library, declared: Fit) -> tuple[Library, Fit]:
     return library, declared
 
 
-def likelier_form(library: Library, least: float, fitted: Callable[[Library], Fit]) -> Model | None:
+def likelier_form(library: Library, least: float, fitted: Callable[[Library], Fit | None]) -> Model | None:
     """Return the declared model with one of its effects in the likeliest other form, None where none is likelier.
 
     least: how probable the records are as it is, see `schwarz`; another form is charged as a parameter is. fitted:

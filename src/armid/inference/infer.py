@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from math import comb
 from pathlib import Path
 from typing import Any
@@ -34,8 +34,8 @@ from armid.inference.hypothesis import Hypotheses, Hypothesis
 from armid.inference.kinds.effects import least_waves
 from armid.inference.kinds.same_law import doubles
 from armid.inference.library import Library, library_of
-from armid.inference.model import Fit, accurate, fit_from, start_of
-from armid.inference.moves import Exploration
+from armid.inference.model import Fit, accurate, fit_from, start_of, unless_diverged
+from armid.inference.moves import Exploration, near, simpler
 from armid.inference.posterior import CONSTANTS_TEXT, Posterior, posterior, spread
 from armid.inference.search import explore, without_denied
 from armid.inference.unknowns import freed
@@ -52,6 +52,8 @@ REACH_OF_STRENGTHS = 16.0
 # Share of what a model leaves, below which noise of the inputs is a trifle: a thousandth of its square. What ends near
 # it is judged again with that noise.
 TRIFLE = 0.03
+# Shares of its range at which a shape of another form is tried.
+SHARES_OF_SHAPE = (0.01, 0.03, 0.1, 0.3, 0.9)
 # Names in the sentence that leads, and constants that are named as a cause of an interval's width.
 MOST_LEADING, MOST_CONSTANTS = 5, 3
 
@@ -340,7 +342,7 @@ def inferred(library: Library, declared: Fit, changes: Sequence[Change]) -> Infe
         other = change(library, inference)
         if other is library:
             continue
-        if other.declared is library.declared:
+        if other.declared is library.declared and other.own_shapes_free == library.own_shapes_free:
             again = declared_again(other, declared)
         else:
             other, again = with_fitting_shapes(*with_scales(other))
@@ -485,13 +487,34 @@ def with_likelier_form(library: Library, inference: Inference) -> Library:
     """
     if not (inference.in_force or inference.posterior.unknown_is_likely):
         return library
-    fit = inference.exploration.fits[inference.in_force]
+    exploration = inference.exploration
+    # a name of the model in force may only stand in for the other form
+    models = [inference.in_force, *simpler(exploration, inference.in_force)]
 
-    def fitted(other: Library) -> Fit:
-        return fitted_to(replace(other, own_shapes_free=library.own_shapes_free), fit, inference)
+    def fitted(other: Library) -> Fit | None:
+        there = replace(other, own_shapes_free=True)
+        fits = [unless_diverged(partial(in_other_form, exploration.fits[m], there, inference)) for m in models]
+        return max((fit for fit in fits if fit is not None), key=schwarz, default=None)
 
-    form = likelier_form(library, schwarz(fit), fitted)
-    return library if form is None else in_form(library, form)
+    least, found = schwarz(exploration.fits[inference.in_force]), library
+    if library.own_shapes and not library.own_shapes_free:
+        same = fitted(replace(in_form(library, library.declared), bundles=()))
+        if same is not None and schwarz(same) > least:
+            least, found = schwarz(same), replace(library, own_shapes_free=True, _problems={})
+    form = likelier_form(library, least, fitted)
+    return found if form is None else replace(in_form(library, form), own_shapes_free=True)
+
+
+def in_other_form(fit: Fit, library: Library, inference: Inference) -> Fit | None:
+    """Return a model of an inference with a declared effect in another form, its shapes tried over their range."""
+    weight, parameters = inference.exploration.scale().weight, library.declared.parameters
+    ends = {name: (parameters[name].low, parameters[name].high) for name in library.own_shapes}
+    places = [fit.values | {n: low + share * (high - low) for n, (low, high) in ends.items()}
+              for share in SHARES_OF_SHAPE if ends]  # fmt: skip
+    again = near(fit, fit.active, [fit.values, *places], library, weight)
+    if again is None or not again.others:
+        return again and accurate(again, library)
+    return freed(again, again.base or again.records, [f.unknown for f in again.others], weight)
 
 
 CHANGES: tuple[Change, ...] = (with_exact_inputs, with_answering_inputs, with_noise_in_motion, with_likelier_form)
