@@ -141,7 +141,8 @@ def test_dry_friction_of_the_machine_is_not_looked_for_and_improbable_in_another
     candidates = {n: EFFECTS[n] for n in ("coulomb", "viscous", "torque_offset", "presliding", "drive_gain")}
     library, _ = prepared(Model(declared.plant) + own, declared, candidates)
     assert {(k.public, k.form): (d.name, d.exactly) for k, d in library.doubles.items()} == {
-        ("coulomb", ""): ("bearing.level", False), ("coulomb", "tanh"): ("bearing.level", True)}  # fmt: skip
+        ("coulomb", ""): ("bearing.level", False), ("coulomb", "tanh"): ("bearing.level", True),
+        ("coulomb", "arctan"): ("bearing.level", False)}  # fmt: skip
     assert library.left_out == {EffectKey("coulomb", "tanh"): "bearing.level"}
     priors = {(k.public, k.form): h.log_prior for k, h in hypotheses(library).items()}
     assert priors["coulomb", ""] < priors["presliding", ""]

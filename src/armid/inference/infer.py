@@ -479,9 +479,8 @@ def with_measured_inputs(library: Library, fit: Fit) -> Library:
     return library.with_data(replace(with_noise, records=records), as_read=data)
 
 
-# In this order: inputs that are wrongly taken for noisy, or for exact, look like noise in motion.
 def with_likelier_form(library: Library, inference: Inference) -> Library:
-    """Return the library with a declared effect in another form, if the model in force is more probable so.
+    """Return the library with a declared effect in another form, or its shapes free, if records are more probable so.
 
     Far from the noise a form that is wrong may do as well as the right one.
     """
@@ -517,4 +516,5 @@ def in_other_form(fit: Fit, library: Library, inference: Inference) -> Fit | Non
     return freed(again, again.base or again.records, [f.unknown for f in again.others], weight)
 
 
+# In this order: inputs that are wrongly taken for noisy, or for exact, look like noise in motion.
 CHANGES: tuple[Change, ...] = (with_exact_inputs, with_answering_inputs, with_noise_in_motion, with_likelier_form)
