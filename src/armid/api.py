@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from armid.errors import ArmidError, DataError, ModelError, nearest, nearest_registered, quoted
-from armid.model import Array, Effect, Manoeuvre, Model, Plant, effect_named, refusal_of
+from armid.model import Array, Effect, Manoeuvre, Model, Plant, effect_name, effect_named, refusal_of
 from armid.model.effects.sensor import sensor_effects
 from armid.model.parameter import warn_if_far
 from armid.progress import announced, search_bar, status_line
@@ -76,7 +76,7 @@ def opened(
     effects_known = registry.effects_for(read.plant)
     if model is None:
         for text in read.effects:
-            chosen(text.partition(":")[0], {**sensor_effects(read.declared), **effects_known}, "effect")
+            chosen(effect_name(text), {**sensor_effects(read.declared), **effects_known}, "effect")
         model = read.model(registry.effects)
     for effect in each_of(effects):
         model = model + effect_of(effect, effects_known, read.plant)
@@ -138,7 +138,7 @@ def effect_of(given: Any, effects: Mapping[str, Effect], plant: Plant) -> Effect
     if isinstance(given, Effect):
         return given
     text = str(given).strip()
-    chosen(text.partition(":")[0], effects, "effect")
+    chosen(effect_name(text), effects, "effect")
     return effect_named(text, effects, plant)
 
 

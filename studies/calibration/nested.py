@@ -23,8 +23,8 @@ from scipy.special import erf, ndtri
 from ultranest import ReactiveNestedSampler
 
 from armid.inference.evidence import SCALES_OF_STRENGTH, Expansion, Scale, expansion_of, log_evidence
-from armid.inference.hypothesis import words
 from armid.inference.infer import infer, prepared
+from armid.inference.kinds.hypothesis import words
 from armid.record import read_campaign
 from calibration.campaigns import Task, campaign_of, seconds, written
 

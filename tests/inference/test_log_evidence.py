@@ -19,7 +19,7 @@ from armid.inference.evidence import (
     log_strengths,
     log_tails,
 )
-from armid.inference.hypothesis import Hypothesis, Proposal
+from armid.inference.kinds.hypothesis import Hypothesis, Proposal
 from armid.inference.posterior import Atom, Posterior, most_odds, truncated
 from armid.inference.whitening import Cover
 

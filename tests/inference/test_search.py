@@ -12,8 +12,8 @@ from armid.inference import infer, moves, prepared, search
 from armid.inference.candidates import EffectKey
 from armid.inference.decisions import WINDOW
 from armid.inference.evidence import expansion_of, forecast
-from armid.inference.hypothesis import Hypothesis, may_join
 from armid.inference.kinds import effects, faults
+from armid.inference.kinds.hypothesis import Hypothesis, may_join
 from armid.inference.library import Activation, Library
 from armid.inference.model import best_along
 from armid.inference.moves import Exploration, drops

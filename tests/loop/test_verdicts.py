@@ -8,7 +8,7 @@ import pytest
 
 from armid.inference import Inference
 from armid.inference.checks import Diagnosis, Finding
-from armid.inference.hypothesis import Hypothesis
+from armid.inference.kinds.hypothesis import Hypothesis
 from armid.inference.posterior import Atom, Posterior
 from armid.loop import Judgement, Step
 from armid.loop.close_loop import confirmed, is_denied, limits_of, path_of, steps_of, verdicts_of

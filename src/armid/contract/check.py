@@ -95,8 +95,9 @@ def plausible(issues: Sequence[DataIssue]) -> list[ContractPoint]:
         # what holds for several records is one sentence with their names
         of_record, said = s.sentence.startswith(f"{s.record}: "), s.sentence.removeprefix(f"{s.record}: ")
         alike.setdefault((s.kind, said), []).extend([s.record] if of_record else [])
-    wrong = [ContractPoint(f"plausible ({kind})", kind == "unjudged", f"{', '.join(files)}: {said}" if files else said,
-                           kind == "unjudged") for (kind, said), files in alike.items()]  # fmt: skip
+    unclear = "unjudged"
+    wrong = [ContractPoint(f"plausible ({kind})", kind == unclear, f"{', '.join(files)}: {said}" if files else said,
+                           kind == unclear) for (kind, said), files in alike.items()]  # fmt: skip
     right = "no sign, unit, clock or manoeuvre of a record looks wrong, as far as the declared model can tell"
     return wrong or [ContractPoint("plausible", True, right)]
 

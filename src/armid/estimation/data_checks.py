@@ -5,7 +5,6 @@ the declared model is fitted roughly to the train records; where it misses more 
 of mistakes is undone in turn, and one is named only where that takes away most of the misfit.
 """
 
-from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
@@ -520,16 +519,16 @@ def given_twice(records: Sequence[Record]) -> Iterator[DataIssue]:
     _, place, counts = np.unique(np.concatenate(prints), return_inverse=True, return_counts=True)
     shared = np.flatnonzero(counts[place] > 1)
     groups = np.split(owner[shared][np.argsort(place[shared], kind="stable")], np.cumsum(counts[counts > 1])[:-1])
-    pairs = Counter(pair for group in groups for pair in combinations(np.unique(group).tolist(), 2))
-    for (i, j), n in sorted(pairs.items()):
+    for i, j in sorted({pair for group in groups for pair in combinations(np.unique(group).tolist(), 2)}):
         a, b = records[i], records[j]
         _, in_a, in_b = np.intersect1d(prints[i], prints[j], return_indices=True)
         alike = ((places[i], places[i][in_a]), (places[j], places[j][in_b]))
         overlaps = all(any(end(whole) == end(part) for whole, part in alike) for end in (np.min, np.max))
         if a.manoeuvre_file == b.manoeuvre_file or not overlaps:
             continue
-        yield DataIssue("twice", a.file, f"{a.file} and {b.file} hold the same {n + ALIKE_VALUES - 1} samples: one "
-                        "recording is given twice, records that do not overlap are expected.")  # fmt: skip
+        n = len(in_a) + ALIKE_VALUES - 1
+        yield DataIssue("twice", a.file, f"{a.file} and {b.file} hold the same {n} samples: one recording is given "
+                        "twice, records that do not overlap are expected.")  # fmt: skip
 
 
 def fingerprints(values: Array) -> tuple[NDArray[np.uint64], NDArray[np.int64]]:

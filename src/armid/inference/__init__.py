@@ -6,9 +6,9 @@ infer         the whole way: campaign -> probabilities and intervals
 whitening     train records with their noise -> residuals whose noise is white
 declared      the declared model: its fit, its scales, the shapes and forms of its effects
 library       the candidate effects, compiled together and ready to be tried; `candidates`: their keys and bundles
-hypothesis    what the declared model of the machine and its records may lack
 decisions     prior beliefs, from calibration.toml, and all other numbers that decide
-kinds         the kinds of hypotheses, one file each: effects, faults of records, drifts, a signal without a form
+kinds         what the declared model of the machine and its records may lack, a hypothesis, and its kinds, one file
+              each: effects, faults of records, drifts, a signal without a form
 model         a model at its estimate, and refits of it; `unknowns`: constants, faults, drifts, with their priors
 evidence      how probable the records are in a model, and what a hypothesis more would do to that
 search        which models are fitted; `moves`: from one model to its neighbours; `shooting`: far from the noise, on

@@ -18,9 +18,9 @@ from armid.estimation.corrections import rms
 from armid.estimation.least_squares import descend
 from armid.inference.checks import Residuals
 from armid.inference.decisions import EXPLAINS, NOT_CARRIED, OUTSIDE, OVER_NOISE
-from armid.inference.hypothesis import Hypotheses
 from armid.inference.kinds.drifts import LARGEST_DRIFT
 from armid.inference.kinds.faults import PLAUSIBLE
+from armid.inference.kinds.hypothesis import Hypotheses
 from armid.inference.library import Library
 from armid.inference.model import ROUGHLY, Fit
 from armid.inference.whitening import WhitenedData, WhiteRecords

@@ -163,9 +163,10 @@ class Residuals:
         names = variable_names(self.model)
         parts: dict[str, list[Array]] = {n: [] for n in names}
         for replay in self.replays:
+            own = replay.ready.own(self.candidate)
             triples = zip(replay.pieces, replay.calibrations, replay.record.samples, strict=True)
             for piece, calibration, samples in triples:
-                motion = along(self.model, piece.manoeuvre, self.candidate, calibration.schedule, names)
+                motion = along(self.model, piece.manoeuvre, own, calibration.schedule, names)
                 for n in names:
                     parts[n].append(motion[n][samples])
         return {n: np.concatenate(p) for n, p in parts.items()}

@@ -9,8 +9,19 @@ import numpy as np
 from armid.engine import along
 from armid.estimation.least_squares import descend, held_by_bound, spread_starts
 from armid.inference.candidates import bundled
+from armid.inference.kinds import effects
 from armid.inference.library import Library
-from armid.inference.model import ROUGHLY, Fit, accurate, fit_from, unless_diverged, with_own_shapes
+from armid.inference.model import (
+    ROUGHLY,
+    Fit,
+    accurate,
+    finished,
+    fit_from,
+    problem_about,
+    starts_of_shapes,
+    unless_diverged,
+)
+from armid.inference.unknowns import freed
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array, Model, refusal_of
 
@@ -97,7 +108,12 @@ def with_fitting_shapes(library: Library, declared: Fit) -> tuple[Library, Fit]:
     if not library.own_shapes:
         return library, declared
     free = replace(library, own_shapes_free=True, _problems={})
-    wide = unless_diverged(lambda: with_own_shapes(declared, free))
+
+    def fitted() -> Fit:
+        problem = problem_about(declared, (), free)
+        return finished(fit_from(problem, (), starts_of_shapes(declared, problem, free.own_shapes), rough=True), free)
+
+    wide = unless_diverged(fitted)
     return (library, declared) if wide is None or schwarz(wide) <= schwarz(declared) else (free, wide)
 
 
@@ -131,6 +147,16 @@ def in_form(library: Library, form: Model) -> Library:
     """Return the library with a declared model that has its effects in other forms."""
     return replace(library, declared=form, bundles=bundled(form, library.candidates), own_shapes_free=False,
                    _models={}, _problems={}, _schedules={})  # fmt: skip
+
+
+def in_other_form(fit: Fit, library: Library, weight: float) -> Fit | None:
+    """Return a model with a declared effect in another form and its shapes free, fitted from how it stands in a fit."""
+    problem = effects.records_with(fit, fit.active, library)
+    starts = starts_of_shapes(fit, problem, library.own_shapes)
+    again = effects.fitted(fit, problem, fit.active, starts, library, weight)
+    if again is None or not again.others:
+        return again and accurate(again, library)
+    return freed(again, again.base or again.records, [f.unknown for f in again.others], weight)
 
 
 def other_forms(library: Library) -> Iterator[Model]:

@@ -25,7 +25,7 @@ from armid.estimation.constants import NAMED
 from armid.inference.candidates import EffectKey
 from armid.inference.checks import is_significant
 from armid.inference.decisions import OUT_OF_TOLERANCE
-from armid.inference.hypothesis import Proposal
+from armid.inference.kinds.hypothesis import Proposal
 from armid.inference.library import Library
 from armid.inference.model import Fit
 from armid.model import Array

@@ -23,6 +23,7 @@ from armid.inference.decisions import LISTED, calibration
 from armid.inference.declared import (
     declared_again,
     in_form,
+    in_other_form,
     likelier_form,
     schwarz,
     with_fitting_forms,
@@ -30,12 +31,12 @@ from armid.inference.declared import (
     with_scales,
 )
 from armid.inference.evidence import expansion_of
-from armid.inference.hypothesis import Hypotheses, Hypothesis
 from armid.inference.kinds.effects import least_waves
+from armid.inference.kinds.hypothesis import Hypotheses, Hypothesis
 from armid.inference.kinds.same_law import doubles
 from armid.inference.library import Library, library_of
 from armid.inference.model import Fit, accurate, fit_from, start_of, unless_diverged
-from armid.inference.moves import Exploration, near, simpler
+from armid.inference.moves import Exploration, simpler
 from armid.inference.posterior import CONSTANTS_TEXT, Posterior, posterior, spread
 from armid.inference.search import explore, without_denied
 from armid.inference.unknowns import freed
@@ -46,14 +47,12 @@ from armid.problem.space import Space
 from armid.record import Campaign
 
 # Returns the library with another noise or form, where an inference shows it, else the library as it is.
-Change = Callable[[Library, "Inference"], Library]
+Revision = Callable[[Library, "Inference"], Library]
 # By which factor strengths that scale with the machine may exceed their declared range.
 REACH_OF_STRENGTHS = 16.0
 # Share of what a model leaves, below which noise of the inputs is a trifle: a thousandth of its square. What ends near
 # it is judged again with that noise.
 TRIFLE = 0.03
-# Shares of its range at which a shape of another form is tried.
-SHARES_OF_SHAPE = (0.01, 0.03, 0.1, 0.3, 0.9)
 # Names in the sentence that leads, and constants that are named as a cause of an interval's width.
 MOST_LEADING, MOST_CONSTANTS = 5, 3
 
@@ -315,13 +314,13 @@ def infer(library: Library, declared: Fit) -> Inference:
 
     Each hypothesis (an effect, a fault of one record, a drift, a signal without a form) is a block of further unknowns
     with a prior, or a covariance. Models are explored in Occam's window; `evidence` says how one gets its probability.
-    All is repeated with another noise, or form of a declared effect, where the records are more probable so: `CHANGES`,
-    each at most once.
+    All is repeated with another noise, or form of a declared effect, where the records are more probable so, each at
+    most once: `REVISIONS`.
     """
-    return inferred(library, declared, CHANGES)
+    return inferred(library, declared, REVISIONS)
 
 
-def inferred(library: Library, declared: Fit, changes: Sequence[Change]) -> Inference:
+def inferred(library: Library, declared: Fit, changes: Sequence[Revision]) -> Inference:
     """Return an inference, with the first of some changes of the noise that it asks for, and those after it.
 
     Noise of the inputs counts from the first leading model on that may show it: what it does looks like many effects.
@@ -486,13 +485,13 @@ def with_likelier_form(library: Library, inference: Inference) -> Library:
     """
     if not (inference.in_force or inference.posterior.unknown_is_likely):
         return library
-    exploration = inference.exploration
+    exploration, weight = inference.exploration, inference.exploration.scale().weight
     # a name of the model in force may only stand in for the other form
     models = [inference.in_force, *simpler(exploration, inference.in_force)]
 
     def fitted(other: Library) -> Fit | None:
         there = replace(other, own_shapes_free=True)
-        fits = [unless_diverged(partial(in_other_form, exploration.fits[m], there, inference)) for m in models]
+        fits = [unless_diverged(partial(in_other_form, exploration.fits[m], there, weight)) for m in models]
         return max((fit for fit in fits if fit is not None), key=schwarz, default=None)
 
     least, found = schwarz(exploration.fits[inference.in_force]), library
@@ -504,17 +503,5 @@ def with_likelier_form(library: Library, inference: Inference) -> Library:
     return found if form is None else replace(in_form(library, form), own_shapes_free=True)
 
 
-def in_other_form(fit: Fit, library: Library, inference: Inference) -> Fit | None:
-    """Return a model of an inference with a declared effect in another form, its shapes tried over their range."""
-    weight, parameters = inference.exploration.scale().weight, library.declared.parameters
-    ends = {name: (parameters[name].low, parameters[name].high) for name in library.own_shapes}
-    places = [fit.values | {n: low + share * (high - low) for n, (low, high) in ends.items()}
-              for share in SHARES_OF_SHAPE if ends]  # fmt: skip
-    again = near(fit, fit.active, [fit.values, *places], library, weight)
-    if again is None or not again.others:
-        return again and accurate(again, library)
-    return freed(again, again.base or again.records, [f.unknown for f in again.others], weight)
-
-
 # In this order: inputs that are wrongly taken for noisy, or for exact, look like noise in motion.
-CHANGES: tuple[Change, ...] = (with_exact_inputs, with_answering_inputs, with_noise_in_motion, with_likelier_form)
+REVISIONS: tuple[Revision, ...] = (with_exact_inputs, with_answering_inputs, with_noise_in_motion, with_likelier_form)

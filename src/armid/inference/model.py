@@ -328,15 +328,6 @@ def with_free_shapes(fit: Fit, key: EffectKey, library: Library, problem: WhiteR
     return fit_from(records, active, starts_of_shapes(fit, records, library.fixed_shapes(key), [rest]), rough=True)
 
 
-def with_own_shapes(fit: Fit, library: Library) -> Fit:
-    """Return a fit of the declared model with the fixed shapes of its own effects free.
-
-    library: one in which they are.
-    """
-    records = problem_about(fit, (), library)
-    return finished(fit_from(records, (), starts_of_shapes(fit, records, library.own_shapes), rough=True), library)
-
-
 def starts_of_shapes(
     fit: Fit, records: WhiteRecords, shapes: Sequence[str], rests: Sequence[Array] = ()
 ) -> list[Array]:
@@ -345,8 +336,8 @@ def starts_of_shapes(
     fit: where they are fixed. rests: candidates from which each shape is tried too.
     """
     known, names = dict(zip(fit.records.space.names, fit.candidate, strict=True)), records.space.free_names
-    z, free = records.shares(np.array([known[n] for n in names])), np.isin(names, list(shapes))
-    starts = [np.where(free, share, z) for share in STARTS]
+    z, free = records.shares(free_values(records, known)), np.isin(names, list(shapes))
+    starts = [np.where(free, share, z) for share in STARTS if free.any()]
     units = [records.model.parameters[n].unit for n in names]
     starts += [best_along(records, at, place, N_PLACES_OF_SHAPE if units[place] == "s" else N_PLACES_OF_SHAPE // 8)
                for place in map(int, np.flatnonzero(free)) for at in (z, *rests)]  # fmt: skip

@@ -16,8 +16,8 @@ from armid.inference.candidates import CONSTANT, EffectKey
 from armid.inference.checks import is_significant, square_along
 from armid.inference.decisions import HOPELESS, REFITTED, WINDOW
 from armid.inference.evidence import Expansion, Forecast, Scale, expansion_of, forecast, log_evidence, scale_of
-from armid.inference.hypothesis import Hypotheses, Hypothesis, Proposal, log_prior
 from armid.inference.kinds import effects
+from armid.inference.kinds.hypothesis import Hypotheses, Hypothesis, Proposal, log_prior
 from armid.inference.library import Library
 from armid.inference.model import UNTOLD, Fit, beyond, decomposed, fit_from, start_of, unless_diverged
 from armid.inference.unknowns import Unknown, constant, freed, projected

@@ -15,7 +15,7 @@ from armid.estimation.least_squares import held_by_bound
 from armid.inference.checks import train_residuals
 from armid.inference.decisions import MENTIONED, calibration
 from armid.inference.evidence import USUAL_STRENGTH, Expansion, expansion_of
-from armid.inference.hypothesis import Hypotheses, log_prior
+from armid.inference.kinds.hypothesis import Hypotheses, log_prior
 from armid.inference.model import Fit
 from armid.inference.moves import Exploration
 from armid.inference.unknowns import residuals_at

@@ -17,8 +17,8 @@ from armid.inference.candidates import EffectKey
 from armid.inference.checks import is_significant
 from armid.inference.decisions import HOPELESS, REFITTED, WINDOW
 from armid.inference.evidence import expansion_of, forecast
-from armid.inference.hypothesis import Hypotheses, Hypothesis, Proposal, may_join, words
 from armid.inference.kinds import drifts, effects, faults, unknown
+from armid.inference.kinds.hypothesis import Hypotheses, Hypothesis, Proposal, may_join, words
 from armid.inference.library import Library
 from armid.inference.model import Fit, finished, unless_diverged, with_free_shapes
 from armid.inference.model import freed as freed_shape

@@ -157,7 +157,7 @@ def freed(
         raise ArmidError("a fit with further unknowns diverges where it starts: other bounds are expected")
     damping, columns, is_new = FIRST_DAMPING, columns_about(base.plain, unknowns, values, z, kept), not kept
     # to first order all candidates have their best starts; a rough fit takes them anew where it ends
-    follows = fits_starts(base.replays) and not rough
+    has_starts = fits_starts(base.replays)
     for _ in range(MOST_ROUGH if rough else MOST_ITERATIONS):
         problem = moved(base, unknowns, values)
         here, square, slope = normal_equations(problem, residual, columns, values, z, weight)
@@ -172,7 +172,7 @@ def freed(
         if fall > 0.0:
             z, values, cost, damping = tried[best][: len(z)], tried[best][len(z) :], costs[best], dampings[best]
             residual = residuals[best]
-            if follows:
+            if has_starts and not rough:
                 base = about_starts(base, unknowns, values, z)
                 (begun,), (residual,) = costs_at(base, unknowns, values[np.newaxis], z[np.newaxis], weight)
                 cost = min(cost, begun)
@@ -187,7 +187,7 @@ def freed(
         is_new = has_arrived or fall < FORETOLD * float(2.0 * slope @ step - step @ square @ step)
         if is_new:
             columns = columns_about(base.plain, unknowns, values, z, {})
-    if rough and fits_starts(base.replays):
+    if has_starts and rough:
         base = about_starts(base, unknowns, values, z)
         residual = costs_at(base, unknowns, values[np.newaxis], z[np.newaxis], weight)[1][0]
     return landed(fit, base, unknowns, values, z, residual, columns)

@@ -19,8 +19,8 @@ from armid.inference.candidates import ERROR_OF
 from armid.inference.carry_over import in_doubt_sentences, missed_sentences, over_noise
 from armid.inference.checks import holdout_residuals, is_significant, train_residuals
 from armid.inference.decisions import CLAIMED, DENIED, MENTIONED, OVER_NOISE, WINDOW, WITHIN
-from armid.inference.hypothesis import Hypotheses, Hypothesis, words
 from armid.inference.infer import Inference, infer, prepared
+from armid.inference.kinds.hypothesis import Hypotheses, Hypothesis, words
 from armid.inference.kinds.missing_signal import missing_from
 from armid.inference.library import Library, calibrated_replays
 from armid.inference.model import (
@@ -174,7 +174,7 @@ def close_loop(
     again = [f"Record {s.record} once more, or look at how it was made." for s in suspects if s.kind != "trend"]
     doubt = [] if after.fails_to_carry_over else in_doubt_sentences(after.train, after.holdout)
     next_steps = (
-        *otherwise_than(model, inference.exploration.library),
+        *otherwise_than_default(inference.exploration.library),
         *told_first,
         *missed_sentences(after.missed),
         *doubt,
@@ -186,10 +186,10 @@ def close_loop(
                       next_steps, together, tuple(suspects), errors, inference, missing)  # fmt: skip
 
 
-def otherwise_than(model: Model, library: Library) -> list[str]:
+def otherwise_than_default(library: Library) -> list[str]:
     """Say which forms and shapes of a declared model's effects are not those that it takes where none is given."""
-    forms = [f"{new.name} is in its form {new.form}"
-             for old, new in zip(model.effects, library.declared.effects, strict=True) if new != old]  # fmt: skip
+    pairs = zip(library.as_declared.effects, library.declared.effects, strict=True)
+    forms = [f"{new.name} is in its form {new.form}" for old, new in pairs if new != old]
     shapes = [f"{', '.join(library.own_shapes)} is fitted"] if library.own_shapes_free else []
     if not forms + shapes:
         return []

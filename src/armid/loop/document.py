@@ -15,8 +15,8 @@ from armid.inference.candidates import ERROR_OF
 from armid.inference.carry_over import missed_sentences, over_noise
 from armid.inference.checks import Finding, Residuals, time_in_words
 from armid.inference.decisions import EXPLAINS, LISTED, OVER_NOISE, SIGNIFICANCE
-from armid.inference.hypothesis import words
 from armid.inference.infer import Inference, sentence_of
+from armid.inference.kinds.hypothesis import words
 from armid.inference.kinds.missing_signal import Missing
 from armid.inference.model import Fit
 from armid.inference.posterior import UNSEEN

@@ -16,10 +16,10 @@ from armid.inference.carry_over import Missed, least_noise, missed_records
 from armid.inference.checks import Diagnosis, Residuals
 from armid.inference.decisions import AS_WELL, CLAIMED, OVER_NOISE
 from armid.inference.evidence import expansion_of
-from armid.inference.hypothesis import Hypotheses, Hypothesis, words
 from armid.inference.infer import Inference
 from armid.inference.kinds.drifts import OfParameter
 from armid.inference.kinds.faults import OfRecord
+from armid.inference.kinds.hypothesis import Hypotheses, Hypothesis, words
 from armid.inference.kinds.missing_signal import Missing
 from armid.inference.library import Library
 from armid.inference.model import Fit

@@ -117,14 +117,16 @@ def refusal_of(effect: Effect, plant: Plant) -> str:
 
 
 def effect_named(text: str, known: Mapping[str, Effect], plant: Plant) -> Effect:
-    """Return the effect of a text, NAME or NAME:FORM; without a word, the first form that the plant takes."""
-    name, _, form = text.partition(":")
-    return known[name].in_form(form) if form else fitting_form(known[name], plant)
-
-
-def fitting_form(effect: Effect, plant: Plant) -> Effect:
-    """Return the first form of an effect that a plant takes, the effect itself where it takes none."""
+    """Return the effect of a text, NAME or NAME:FORM; without a word, the first form that fits."""
+    effect, form = known[effect_name(text)], text.partition(":")[2]
+    if form:
+        return effect.in_form(form)
     return next((form for form in effect.searched_forms if not refusal_of(form, plant)), effect)
+
+
+def effect_name(text: str) -> str:
+    """Return the name of the effect of a text, NAME or NAME:FORM."""
+    return text.partition(":")[0]
 
 
 def distinct(effects: Mapping[K, Effect], plant: Plant) -> dict[K, Effect]:

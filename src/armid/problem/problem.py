@@ -50,6 +50,8 @@ class ReadyRecord:
 
     def own(self, candidates: Array) -> Array:
         """Return whole candidates, (..., n_parameters), with the changes of this record."""
+        if not self.changes:
+            return candidates
         return np.asarray(candidates + [self.changes.get(name, 0.0) for name in self.model.parameters])
 
     def corrected(self, runs: Sequence[Simulation]) -> list[Simulation]:

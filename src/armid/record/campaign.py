@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from armid.errors import ArmidError, DataError, caused_by, located, nearest, quoted
-from armid.model import EFFECTS, PLANTS, Array, Effect, Model, Output, Parameter, Plant, effect_named
+from armid.model import EFFECTS, PLANTS, Array, Effect, Model, Output, Parameter, Plant, effect_name, effect_named
 from armid.model.effects.sensor import sensor_effects
 from armid.model.parameter import resolve, warn_if_far
 from armid.record.reader import CAMPAIGN_FILE, CSV_SUFFIX, campaign_path, gravity_of, record_of, record_path
@@ -192,11 +192,11 @@ def as_toml(value: Any) -> Any:
 
 def refuse_effects(texts: Sequence[str], known: Mapping[str, Effect], where: str) -> None:
     """Refuse effects, NAME or NAME:FORM, that are unknown, and one that is given twice."""
-    names = [text.partition(":")[0] for text in texts]
+    names = [*map(effect_name, texts)]
     for i, (name, text) in enumerate(zip(names, texts, strict=True)):
         if name not in known:
             raise unknown_name("effect", text, known, where)
-        if ":" in text:
+        if name != text:
             with located(where):
                 known[name].in_form(text.partition(":")[2])
         if name in names[:i]:

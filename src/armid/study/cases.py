@@ -14,7 +14,7 @@ import numpy as np
 from armid.engine import FINE, Schedule, calibrate, simulate
 from armid.errors import ArmidError, located, quoted
 from armid.estimation.least_squares import with_fitted_starts
-from armid.model import Manoeuvre, Model, Plant
+from armid.model import Manoeuvre, Model, Plant, effect_name
 from armid.problem.problem import Replay, replays
 from armid.problem.space import Space, space_of
 from armid.problem.suite import DEFINITIONS, N_INSTANCES, VERSION, SuiteProblem, suite
@@ -147,7 +147,7 @@ def _campaign_case(
         raise ArmidError(f"{where}: the campaign is of plant '{campaign.plant.name}', '{spec.plant}' is expected")
     declared = campaign.model(registry.effects)
     there = {effect.name for effect in declared.effects}
-    further = [text for text in dict.fromkeys(spec.effects) if text.partition(":")[0] not in there]
+    further = [text for text in dict.fromkeys(spec.effects) if effect_name(text) not in there]
     model = registry.with_effects(declared, further, where)
     space = _space(model, campaign.parameters, spec, entry, where)
     for window in spec.windows_s:

@@ -10,7 +10,7 @@ from typing import Any
 
 from armid.engine.calibrate import ALLOWED
 from armid.errors import MachineError, located
-from armid.model import Model, effect_named
+from armid.model import Model, effect_name, effect_named
 from armid.record.schema import (
     CONSTANTS_KEY,
     EFFECTS_KEY,
@@ -387,7 +387,7 @@ class StudyRegistry(Registry):
     def with_effects(self, model: Model, names: Iterable[str], where: str) -> Model:
         known = self.effects_for(model.plant)
         for name in names:
-            lookup(known, name.partition(":")[0], "effect", where)
+            lookup(known, effect_name(name), "effect", where)
             with located(where):
                 model = model + effect_named(name, known, model.plant)
         return model

@@ -8,13 +8,13 @@ import numpy as np
 from armid.estimation.constants import NAMED, Product, moved_record
 from armid.inference.decisions import calibration
 from armid.inference.evidence import Expansion, Forecast
-from armid.inference.hypothesis import Hypothesis, Proposal
+from armid.inference.kinds.hypothesis import Hypothesis, Proposal
 from armid.inference.library import Library
 from armid.inference.model import Fit, unless_diverged
 from armid.inference.unknowns import Unknown, freed
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array
-from armid.problem.problem import ReadyRecord, with_each
+from armid.problem.problem import ReadyRecord, by_record, with_each
 
 # Fewest record files for a drift to be considered: with fewer a drift is a change in one record. Of two records
 # either may be the other one.
@@ -71,9 +71,8 @@ class Change:
     weights: Array
 
     def __call__(self, records: WhiteRecords, value: float) -> WhiteRecords:
-        ready = list(dict.fromkeys(replay.ready for replay in records.replays))
         new = {old: self.changed(old, value * self.reach * weight)
-               for old, weight in zip(ready, self.weights, strict=True)}  # fmt: skip
+               for old, weight in zip(by_record(records.replays), self.weights, strict=True)}  # fmt: skip
         return replace(records, replays=with_each(records.replays, lambda old: new[old]))
 
     def changed(self, ready: ReadyRecord, size: float) -> ReadyRecord:
@@ -116,7 +115,7 @@ def propose(fit: Fit, known: list[Hypothesis]) -> list[Proposal]:
 
 
 def refit(hypothesis: Hypothesis, fit: Fit, about: Expansion, ahead: Forecast, limit: float) -> Fit | None:
-    """Return the model with a change, fitted from the size that is forecast."""
+    """Return the model with a change, fitted roughly."""
     name = hypothesis.size_name
     others = [f.unknown for f in fit.others if f.unknown.name != name]
     unknown = Unknown(name, hypothesis.means.change(fit))

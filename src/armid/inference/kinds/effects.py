@@ -11,7 +11,7 @@ from armid.inference.candidates import EffectKey
 from armid.inference.checks import square_along, train_residuals
 from armid.inference.decisions import OUT_OF_TOLERANCE, PERIODS, calibration
 from armid.inference.evidence import SCALES_OF_STRENGTH, Expansion, Forecast
-from armid.inference.hypothesis import Hypothesis, Proposal
+from armid.inference.kinds.hypothesis import Hypothesis, Proposal
 from armid.inference.library import OF_WAVES, Activation, Library, activation_grid
 from armid.inference.model import (
     ROUGHLY,

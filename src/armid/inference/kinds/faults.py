@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from armid.inference.decisions import MOVES, calibration
 from armid.inference.evidence import Expansion, Forecast
-from armid.inference.hypothesis import Hypothesis, Proposal
+from armid.inference.kinds.hypothesis import Hypothesis, Proposal
 from armid.inference.library import Library
 from armid.inference.model import Fit, fit_from, unless_diverged
 from armid.inference.unknowns import Unknown, freed, moved

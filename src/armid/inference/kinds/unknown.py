@@ -12,7 +12,7 @@ from scipy.linalg import block_diag
 
 from armid.inference.decisions import calibration
 from armid.inference.evidence import Expansion, Forecast
-from armid.inference.hypothesis import Hypothesis, Proposal
+from armid.inference.kinds.hypothesis import Hypothesis, Proposal
 from armid.inference.kinds.missing_signal import Segment, segments_about
 from armid.inference.library import Library
 from armid.inference.model import Fit, fit_from, unless_diverged
