@@ -346,8 +346,9 @@ def starts_of_shapes(
 
 def best_along(records: WhiteRecords, z: Array, place: int, n: int = N_PLACES_OF_SHAPE) -> Array:
     """Return a candidate with one free parameter at its best value on a grid, the others unchanged, (n_free,)."""
-    tried = np.tile(z, (n, 1))
-    tried[:, place] = (np.arange(n) + 0.5) / n
+    space, tried = records.space, np.tile(z, (n, 1))
+    low, high = space.low[space.free][place], space.high[space.free][place]
+    tried[:, place] = (points_within(low, high, n) - low) / (high - low)
     return np.asarray(tried[np.argmin(records.chi2(tried))])
 
 
