@@ -306,7 +306,8 @@ def prepared(
 
 def searched(library: Library, declared: Fit) -> Library:
     """Return the library with what of it the fit of its declared model leaves out of a search."""
-    return replace(library, doubles=doubles(declared, library), least_waves=least_waves(declared), _problems={})
+    whole = replace(library, doubles={}, least_waves=0.0, _problems={})
+    return replace(whole, doubles=doubles(declared, whole), least_waves=least_waves(declared), _problems={})
 
 
 def infer(library: Library, declared: Fit) -> Inference:
