@@ -146,16 +146,25 @@ def test_a_model_that_missed_its_valley_is_fitted_again_from_the_larger_one(expl
 
 
 class Narrow:
-    """A sum of squares with a narrow valley along its second parameter."""
+    """A sum of squares with a narrow valley along its second parameter, whose range begins at `low`."""
+
+    def __init__(self, low, valley, width):
+        self.space = SimpleNamespace(free=np.ones(2, bool), low=np.array([0.0, low]), high=np.ones(2))
+        self.valley, self.width = valley, width
 
     def chi2(self, Z):
-        return np.where(np.abs(Z[:, 1] - 0.7123) < 0.002, 1.0, 10.0) + (Z[:, 0] - 0.2) ** 2
+        second = self.space.low[1] + Z[:, 1] * (1.0 - self.space.low[1])
+        return np.where(np.abs(second - self.valley) < self.width, 1.0, 10.0) + (Z[:, 0] - 0.2) ** 2
 
 
-def test_a_narrow_valley_is_found_along_one_parameter():
-    best = best_along(Narrow(), np.array([0.5, 0.5]), 1)
+@pytest.mark.parametrize(
+    ("low", "valley", "width"),
+    [(0.0, 0.7123, 0.002), pytest.param(1e-4, 7e-4, 2e-5, id="near the small end of a range over decades")],
+)
+def test_a_narrow_valley_is_found_along_one_parameter(low, valley, width):
+    best = best_along(Narrow(low, valley, width), np.array([0.5, 0.5]), 1)
     assert best[0] == 0.5
-    assert best[1] == pytest.approx(0.7123, abs=0.002)
+    assert low + best[1] * (1.0 - low) == pytest.approx(valley, abs=width)
 
 
 def model(names):
