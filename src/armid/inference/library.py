@@ -472,7 +472,9 @@ def quickly_calibrated(
             break
     schedule = Schedule(n, weights=switch_weights(spread, runs[n]))
     if good and n >= FEWEST_SPARED:
-        # Where steps are fine for the sake of a few samples (friction as it changes its sign), only these need be cut.
+        # Where steps are fine for the sake of a few samples (friction as it changes its sign), only these need be cut,
+        # and as finely as all would have to be.
+        schedule = replace(schedule, refinement=max(schedule.refinement, n))
         sound = spread[~runs[2 * n].failed]
         states = simulate(model, manoeuvre, sound, Schedule(2 * n), states=True).states
         ranges = np.array([np.max(np.ptp(state, axis=-1)) for state in states.values()])
