@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from armid import close_loop, identify, read_campaign
-from armid.estimation.identify_document import answer, details_of, result_of
+from armid.estimation.identify_document import answer, details_of, ranked, result_of
 from armid.estimation.input_noise import answers, at_rest, cosines, moved_by_inputs, pooled_noise, smoothed
 from armid.inference.infer import prepared
 from armid.loop import report_of
@@ -152,6 +152,27 @@ def test_how_far_it_moves_the_model_and_that_this_may_be_all_that_remains(tmp_pa
     assert "what remains may be that alone" in said
     without = identify(campaign(tmp_path / "exact", exact))
     assert "inputs" not in " ".join(answer(result_of(without), details_of(without)))
+
+
+@pytest.mark.parametrize("measured", [noisy, exact])
+def test_an_interval_holds_what_noise_of_an_input_does_where_fitted_starts_and_the_sensor_hide_it(tmp_path, measured):
+    inside, alone = [], []
+    for seed in range(4):
+        tables, rng = {}, np.random.default_rng(seed)
+        for i in range(3):
+            drive = 3.0 * torque(10 * seed + i + 1)[100:]
+            angle = INTERVAL * np.cumsum(speed(drive)) - 0.5 * INTERVAL * speed(drive)
+            tables[f"r{i}.csv"] = {"time_s": TIMES[:700], "drive_N_m": measured(drive, rng),
+                                   "angle_rad": angle + rng.normal(0.0, 0.05, 700)}  # fmt: skip
+        fit = identify(read_campaign(write_records(tmp_path / f"{seed}", HEAD.format([]), tables)))
+        off = [fit.parameters["inertia"].value - INERTIA, fit.parameters["damping"].value - DAMPING]
+        inside += [p.low <= true <= p.high and p.interval_holds for p, true in
+                   ((fit.parameters["inertia"], INERTIA), (fit.parameters["damping"], DAMPING))]  # fmt: skip
+        alone += list(np.abs(off) <= fit.information.half_width)
+        said = " ".join(ranked(fit))
+        assert ("Noise of the inputs moves" in said) == (measured is noisy)
+    assert sum(inside) >= 7
+    assert (sum(alone) <= 5) == (measured is noisy)
 
 
 INPUTS = {

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from armid.engine import Calibration, Schedule, probes
 from armid.estimation.corrections import WIDER_BOUNDS, Correction, DataIssue, corrections, of_pieces, rms
-from armid.estimation.least_squares import WeightedRecords, descend
+from armid.estimation.least_squares import WeightedRecords, descend, with_fitted_starts
 from armid.model import Array, Manoeuvre, Model, Plant
 from armid.model.parameter import powers_of
-from armid.problem.problem import ReadyRecord
+from armid.problem.problem import ReadyRecord, by_record
 from armid.problem.space import Space, space_of
+from armid.problem.starts import fits_starts, with_starts
 from armid.record import Campaign, Piece, Record
 from armid.record.campaign import scaled as scaled_plant
 from armid.record.sensor import correlation_sum
@@ -85,13 +86,15 @@ def data_issues(campaign: Campaign, model: Model, space: Space) -> tuple[DataIss
     if not train:
         return (*seen, *times)
     trial = DataTrial(model, space).scaled(train)
-    train = [trial.thinned(r, len(train)) for r in train]
-    issues, z = mistakes(trial, train)
+    read = [trial.thinned(r, len(train)) for r in train]
+    train = started(trial, read)
+    issues, z = mistakes(trial, train) if train is read else ([], trial.fit(train)[0])
     issues = of_two(issues, train)
     errors = trial.errors(train, z)[0]
     if not issues:
         n = len(campaign.holdout)
         others = [trial.thinned(shortened(r, n), n) for r in campaign.holdout if r.file not in noise]
+        others = [placed(trial, r, z) for r in others]
         issues += [s for r in others for s in apart(trial, r, z, float(np.max(errors)))
                    if s.after * AS_GOOD < least_nearby(trial, train, r, z)]  # fmt: skip
         worst = int(np.argmax(errors))
@@ -217,6 +220,38 @@ class DataTrial:
         # with other bounds there may be other free parameters
         others = [z for z in others if len(z) == spread.shape[1]]
         return self.fit(records, np.vstack([spread, *others]), n_best=N_BEST)
+
+
+def started(trial: DataTrial, train: list[Record]) -> list[Record]:
+    """Return records that start where the declared model's fit starts them, if it explains them so and not as read.
+
+    The first samples of a noisy position tell a speed so poorly that a sound record of little friction drifts away.
+    """
+    problem = trial.problem(train)
+    before = trial.errors(train, trial.fit(train)[0]).max() if fits_starts(problem.replays) else 0.0
+    if before <= TOLERABLE:
+        return train
+    ready = [one.record for one in by_record(with_fitted_starts(problem.replays, trial.space))]
+    return ready if trial.errors(ready, trial.fit(ready)[0]).max() <= most_left(before) else train
+
+
+def placed(trial: DataTrial, record: Record, z: Array) -> Record:
+    """Return a held-out record that starts where a candidate fits it best, if it explains it so and not as read."""
+    before = trial.errors([record], z).max()
+    if before <= TOLERABLE:
+        return record
+
+    def freed(piece: Piece) -> Piece:
+        return replace(piece, shown_start={name: piece.manoeuvre.constants[name] for name in piece.start_deviation})
+
+    problem = trial.problem([record.with_pieces(freed)])
+    (ready,) = by_record(with_starts(problem.replays, problem.whole(z[np.newaxis])[0]))
+    return ready.record if trial.errors([ready.record], z).max() <= most_left(before) else record
+
+
+def most_left(before: float) -> float:
+    """Return which error may be left of an error where what is undone explains it."""
+    return min(CORRECTED * before, LEFT)
 
 
 def mistakes(trial: DataTrial, train: Sequence[Record]) -> tuple[list[DataIssue], Array]:
@@ -374,7 +409,7 @@ def chosen(record: str, before: float, tried: Iterable[tuple[float, Correction]]
 
     Of those that do as well, one that accuses no record comes first.
     """
-    most = min(CORRECTED * before, LEFT)
+    most = most_left(before)
     good = [(e, m) for e, m in tried if e <= (min(most, LEFT_BY_TWO) if m.factor in (0.5, 2.0) else most)]
     if not good:
         return []

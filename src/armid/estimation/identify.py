@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from armid.errors import ArmidError
 from armid.estimation.bootstrap import Refined, Scatter, bootstrap, without
 from armid.estimation.corrections import DataIssue
-from armid.estimation.information import Information, collinear, information_at
+from armid.estimation.information import NORMAL_95, Information, collinear, deviation_by_inputs, information_at
 from armid.estimation.input_noise import moved_by_inputs
 from armid.estimation.least_squares import held_by_bound, refine, with_fitted_starts
 from armid.estimation.noise_model import MISFIT, Level, NoiseModel, known_level, level_of
@@ -40,7 +40,6 @@ from armid.problem.similarity import similarity
 from armid.problem.space import Space
 from armid.problem.starts import with_starts
 from armid.record import Campaign
-from armid.report.document import inputs_act
 from armid.report.result import IDENTIFICATION, Kind, Result
 from armid.units import angles_in, scale_of
 
@@ -167,7 +166,7 @@ class Identification(Result):
         if not space.free[i]:
             return ParameterEstimate(value, space.units[i])
         k, doubt, scatter = self.information.names.index(name), self.interval_doubts[name], self.scatter
-        half = self.information.half_width[k]
+        half = NORMAL_95 * float(np.hypot(self.information.deviation[k], self.moved_by_inputs[k]))
         low, high = (value - half, value + half) if scatter is None else (scatter.low[k], scatter.high[k])
         known = bool(np.isfinite([low, high]).all())
         return ParameterEstimate(
@@ -196,12 +195,9 @@ class Identification(Result):
             return dict.fromkeys(information.names, "the search has not come to the minimum")
         if any(level.from_residual for level in information.levels):
             return dict.fromkeys(information.names, "what the model leaves is more than the noise")
-        left = self.train.outputs
-        if any(inputs_act(o["noise_rms"], o["moved_by_inputs"], left[name].rmse)
-               for name, o in self.outputs.items() if name in left):  # fmt: skip
-            return dict.fromkeys(information.names, "noise of the inputs moves the model by more than that of a sensor")
         doubts = dict.fromkeys(information.names, "")
         if self.scatter is not None:
+            doubts |= dict.fromkeys(self.widened_by_inputs, "noise of the inputs moves it by more than that of sensors")
             shares = zip(information.names, self.scatter.bias / information.deviation, strict=True)
             doubts |= {name: f"its estimate is biased by {share:.2g} standard deviations"
                        for name, share in shares if abs(share) > BIASED}  # fmt: skip
@@ -211,6 +207,18 @@ class Identification(Result):
                 if other in held and not doubts[name]:
                     doubts[name] = f"it is correlated with {other}, which rests at its bound"
         return doubts
+
+    @cached_property
+    def moved_by_inputs(self) -> Array:
+        """How far noise of the inputs moves the estimate, standard deviations, SI, (n_free,)."""
+        levels = tuple(known_level(r) for r in self.train_replays)
+        return deviation_by_inputs(self.train_replays, self.space, self.candidate[self.space.free], levels)
+
+    @property
+    def widened_by_inputs(self) -> tuple[str, ...]:
+        """Free parameters that noise of the inputs moves by more than noise of the sensors does."""
+        more = self.moved_by_inputs > self.information.deviation
+        return tuple(name for name, wider in zip(self.information.names, more, strict=True) if wider)
 
     @property
     def is_far_from_minimum(self) -> bool:

@@ -30,6 +30,7 @@ from armid.report.document import (
     error_table,
     listing,
     made_section,
+    may_be_inputs,
     moved_text,
     noise_text,
     others_text,
@@ -251,6 +252,10 @@ def ranked(identification: Identification) -> list[str]:
     texts = [s.sentence for s in identification.issues] + convergence_remarks(identification)
     texts += [bound_remark(identification, int(i)) for i in np.flatnonzero(identification.at_bound)]
     texts += misfit_remarks(identification)
+    wider = identification.widened_by_inputs
+    if wider and identification.scatter is None:
+        texts.append(f"Noise of the inputs moves {', '.join(wider)} by more than noise of the sensors does, and makes "
+                     "most of what these intervals are wide.")  # fmt: skip
     deviations = zip(information.names, information.deviation, strict=True)
     texts += [f"{name} is not determined by these records." for name, d in deviations if not np.isfinite(d)]
     pairs = collinear(information)
@@ -308,8 +313,14 @@ def convergence_remarks(identification: Identification) -> list[str]:
     train, unseen = identification.train.chi2_per_sample, identification.holdout
     holdout = None if unseen is None else unseen.chi2_per_sample
     if train is not None and holdout is not None and holdout > CARRIES_OVER * max(train, 1.0):
+        known, left = identification.outputs, {} if unseen is None else unseen.outputs
+        missed = {name: e.rmse for name, e in left.items() if e.rmse > CARRIES_OVER * known[name]["noise_rms"]}
+        may = missed and all(
+            may_be_inputs(known[n]["noise_rms"], known[n]["moved_by_inputs"], x) for n, x in missed.items()
+        )
+        why = ", which noise of the inputs may do" if may else ""
         texts.append(f"The fit does not carry over: its mean square is {holdout:.3g} times that of the noise on the "
-                    f"held-out records, {train:.3g} times on those fitted.")  # fmt: skip
+                    f"held-out records, {train:.3g} times on those fitted{why}.")  # fmt: skip
     return texts
 
 

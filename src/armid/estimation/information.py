@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from armid.engine import simulate
 from armid.errors import ArmidError
+from armid.estimation.input_noise import answers, pooled_noise
 from armid.estimation.least_squares import LEAST_DAMPING, LeastSquaresProblem, WeightedRecords, fit, step_in_box
 from armid.estimation.noise_model import Level, level_of, level_weights
 from armid.model import Array
@@ -19,6 +20,8 @@ NORMAL_95 = 1.959963984540054
 SINGULAR = 1e-13
 # Parameters of a larger correlation than this are hardly separated.
 CORRELATED = 0.95
+# Share of what noise of the inputs does, rms, that must show in what is left where it would be larger than the noise.
+LEFT_OF_MOVED = 0.25
 
 
 @dataclass(frozen=True)
@@ -174,6 +177,54 @@ def start_changes(records: LeastSquaresProblem, z: Array, bent: bool = False) ->
                 yield change_of_piece(outputs, index, 0.5 * (above - below))
                 for same in at:
                     yield change_of_piece(outputs, index, 0.5 * (above + below) - same)
+
+
+def deviation_by_inputs(replays: tuple[Replay, ...], space: Space, x: Array, levels: tuple[Level, ...]) -> Array:
+    """Return how far noise of the inputs moves an estimate, standard deviations, SI, (n_free,).
+
+    To first order, with the starts that are fitted. 0 where all inputs are commands, and where what is left is too
+    small to hold such noise: then they are commands as well.
+    """
+    noise = pooled_noise([ready.record for ready in by_record(replays)])
+    if not noise or any(level.rms == 0.0 for level in levels):
+        return np.zeros(len(x))
+    records = WeightedRecords(replays, space, tuple(1.0 / level.rms for level in levels))
+    z = records.shares(x)
+    residual, jacobian = records.residual_and_slopes(z)
+    covariance = inverse(jacobian.T @ jacobian)
+    covariance = np.where(np.isfinite(covariance), covariance, 0.0)
+    moved, left = np.zeros(len(x)), 0.0
+    for ready, outputs in by_record(replays).items():
+        signals = answers(ready, outputs, records.whole(z[np.newaxis])[0], noise, [r.record.noise.rms for r in outputs])
+        for index, piece in enumerate(signals):
+            changes = np.array([records.weighted(each) for each in changes_of_piece(records, outputs, index, piece)])
+            shifts = covariance @ (jacobian.T @ changes.T)
+            moved += np.sum(shifts**2, axis=1)
+            left += float(np.sum((changes.T - jacobian @ shifts) ** 2)) / len(residual)
+    shows = np.mean(residual**2) > 1.0 + LEFT_OF_MOVED**2 * left
+    return np.sqrt(moved) * records.span if shows or left < 1.0 else np.zeros(len(x))
+
+
+def changes_of_piece(
+    records: LeastSquaresProblem, outputs: Sequence[Replay], index: int, columns: Sequence[Array]
+) -> Iterator[list[Array]]:  # fmt: skip
+    """Yield, for each column, how all signals change where those of one piece do, its start being fitted again.
+
+    columns: of each output of the record, (n_samples, n).
+    """
+    correction = outputs[0].record.pieces[index].correction
+    if correction is not None:
+        seen = np.concatenate(columns)
+        lacking = -correction.gain @ seen
+        pairs = zip(columns, correction.slopes.swapaxes(0, 1), correction.samples, strict=True)
+        columns = [each + slopes[:, samples].T @ lacking for each, slopes, samples in pairs]
+    for column in range(columns[0].shape[1]):
+        changes = [np.zeros(r.record.n_samples) for r in records.replays]
+        for change, r in zip(changes, records.replays, strict=True):
+            if r in outputs:
+                first = sum(r.record.lengths[:index])
+                change[first : first + r.record.lengths[index]] = columns[outputs.index(r)][:, column]
+        yield changes
 
 
 def inverse(matrix: Array) -> Array:
