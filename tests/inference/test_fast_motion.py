@@ -142,7 +142,27 @@ def test_dry_friction_of_the_machine_is_not_looked_for_and_improbable_in_another
     library, _ = prepared(Model(declared.plant) + own, declared, candidates)
     assert {(k.public, k.form): (d.name, d.exactly) for k, d in library.doubles.items()} == {
         ("coulomb", ""): ("bearing.level", False), ("coulomb", "tanh"): ("bearing.level", True),
-        ("coulomb", "arctan"): ("bearing.level", False)}  # fmt: skip
-    assert library.left_out == {EffectKey("coulomb", "tanh"): "bearing.level"}
+        ("coulomb", "arctan"): ("bearing.level", False),
+        ("drive_gain", ""): ("a change of mass and bearing.level together", True)}  # fmt: skip
+    assert library.left_out == {EffectKey("coulomb", "tanh"): "bearing.level",
+                                EffectKey("drive_gain"): "a change of mass and bearing.level together"}  # fmt: skip
     priors = {(k.public, k.form): h.log_prior for k, h in hypotheses(library).items()}
     assert priors["coulomb", ""] < priors["presliding", ""]
+
+
+def test_an_effect_that_all_free_parameters_do_together_is_not_looked_for(tmp_path):
+    """A gain of the drive scales inertia, damping and weight: with one of these known it is another matter."""
+    times, rng = 0.02 * np.arange(200), np.random.default_rng(6)
+    table = {"time_s": times, "angle_rad": np.sin(times) + 1e-3 * rng.standard_normal(200), "drive_N_m": np.cos(times)}
+    head, tables = (
+        'name = "arm"\nplant = "rotary_arm"\n',
+        {"a.csv": table, "b.csv": table | {"drive_N_m": np.sin(times)}},
+    )
+    candidates = {n: EFFECTS[n] for n in ("coulomb", "drive_gain")}
+    found = []
+    for i, known in enumerate(("", "[parameters]\ndamping = { fixed = 0.1 }\n")):
+        arm = read_campaign(write_records(tmp_path / f"{i}", head + known, tables, holdout=0))
+        library, _ = prepared(Model(arm.plant), arm, candidates)
+        found.append({key.public: name for key, name in library.left_out.items()})
+    together = "a change of inertia, gravity_moment and damping together"
+    assert found == [{"drive_gain": together}, {}]

@@ -219,7 +219,8 @@ def output_columns(table: CsvTable, plant: Plant) -> tuple[Plant, dict[Output, s
     if not known:
         raise missing(table, "output", [c for o in plant.outputs for c in o.factors])
     for output in plant.outputs:
-        alike = [h for h in table.headers if h == output.name or h.startswith(f"{output.name}_")]
+        alike = [h for h in table.headers
+                 if h not in known.values() and (h == output.name or h.startswith(f"{output.name}_"))]  # fmt: skip
         if output not in known and alike:
             wanted, more = usual_and_rarer([*output.factors])
             warnings.warn(f"{table.file}: column {quoted(alike[0])} is not read as output '{output.name}', "

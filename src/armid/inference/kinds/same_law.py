@@ -6,6 +6,9 @@ pressure does. At states and inputs drawn independently, an effect and a paramet
 parameter changes all rates and outputs as the effect does. Then also while something else acts at the other ports: a
 wrong gain of the drive looks like another mass only until something else acts. An effect in exactly the form of a
 parameter is not tried. One in another form (a sign that is smoothed otherwise) is improbable.
+
+Nor is one tried that all free parameters do together (a gain of the drive, where all that it moves is to be
+identified): records give only ratios of such strengths, and those of what else acts are free as well.
 """
 
 from collections.abc import Collection, Iterable, Mapping
@@ -74,12 +77,12 @@ class States:
         return replace(self, values={**self.values, **{flat(n): self.values[flat(n)] + x for n, x in changes.items()}})
 
     def change(self, name: str, size: float) -> Array:
-        """Return the change of rates and outputs per change of a parameter or constant, (n, n_states).
+        """Return the change of rates and outputs by a change of a parameter or constant, (n, n_states).
 
         Each over its size.
         """
-        after = self.moved({name: CHANGED * size}).rates
-        return np.array([(after[key] - before) / (size_of(before) or 1.0) for key, before in self.rates.items()])
+        after, before = (self.moved({name: sign * CHANGED * size}).rates for sign in (1.0, -1.0))
+        return np.array([(after[key] - before[key]) / (size_of(rate) or 1.0) for key, rate in self.rates.items()])
 
     def changes(self, own: Iterable[str]) -> dict[str, Array]:
         """Return the change by each of some parameters and constants."""
@@ -101,7 +104,9 @@ def doubles(fit: Fit, library: Library) -> dict[EffectKey, Double]:
         if id(records.model) not in known:
             states = scattered(records, candidate_at(records, values))
             known[id(records.model)] = states, states.changes(own)
-        one = double(records, key, *known[id(records.model)], library)
+        states, changes = known[id(records.model)]
+        one = double(records, key, states, changes, library)
+        one = one or of_all(records, key, states, {n: changes[n] for n in values}, library)
         found |= {key: one} if one else {}
     return found
 
@@ -113,22 +118,50 @@ def double(
 
     alone: no effect acts there. own: change by each parameter and constant there.
     """
-    declared = records.model.parameters
-    own_parameters = [declared[n] for n in records.space.names if key.owns(n)]
-    names = [n for n in records.space.names if key.owns(n) and declared[n].null is not None]
-    if len(names) != 1 or any(p.unit == "s" for p in own_parameters):
+    name = only_strength(records, key)
+    if name is None:
         return None
-    size, ports = library.strength_of(names[0], declared[names[0]]), library.candidates[key].adds.keys()
-    change = alone.change(names[0], size)
+    size, ports = library.strength_of(name, records.model.parameters[name]), library.candidates[key].adds.keys()
+    change = alone.change(name, size)
     same = {n: share for n, other in own.items() if (share := apart(change, other)) < SAME_LAW}
     if not same:
         return None
     # Something else acts at the other ports.
     acting = alone.disturbed(ports)
-    change = acting.change(names[0], size)
+    change = acting.change(name, size)
     shares = {n: apart(change, other) for n, other in acting.changes(same).items()}
-    name = min(shares, key=lambda n: shares[n])
-    return Double(name, same[name] < ROUNDING_OF_LAW) if shares[name] < SAME_LAW else None
+    best = min(shares, key=lambda n: shares[n])
+    return Double(best, same[best] < ROUNDING_OF_LAW) if shares[best] < SAME_LAW else None
+
+
+def only_strength(records: WhiteRecords, key: EffectKey) -> str | None:
+    """Return the name of an effect's strength where it has but one, and no time."""
+    declared = records.model.parameters
+    own = [n for n in records.space.names if key.owns(n)]
+    strengths = [n for n in own if declared[n].null is not None]
+    return strengths[0] if len(strengths) == 1 and all(declared[n].unit != "s" for n in own) else None
+
+
+def of_all(
+    records: WhiteRecords, key: EffectKey, alone: States, own: Mapping[str, Array], library: Library
+) -> Double | None:  # fmt: skip
+    """Return which free parameters do together exactly what an effect does, None where they do not."""
+    name = only_strength(records, key)
+    if name is None or not own:
+        return None
+    change = alone.change(name, library.strength_of(name, records.model.parameters[name])).ravel()
+    columns = np.column_stack([x.ravel() for x in own.values()])
+    good = np.isfinite(change) & np.isfinite(columns).all(axis=1)
+    change, columns = change[good], columns[good]
+    sizes = np.linalg.norm(columns, axis=0)
+    if not (change.any() and sizes.all()):
+        return None
+    shares = np.linalg.lstsq(columns / sizes, change, rcond=None)[0]
+    left = change - columns / sizes @ shares
+    if left @ left > ROUNDING_OF_LAW * (change @ change):
+        return None
+    *names, last = (n for n, share in zip(own, shares, strict=True) if share**2 > ROUNDING_OF_LAW * np.max(shares**2))
+    return Double(f"a change of {', '.join(names)} and {last} together" if names else last, True)
 
 
 def scattered(records: WhiteRecords, candidate: Array) -> States:
