@@ -20,7 +20,7 @@ from armid.record import Piece, Record
 from armid.record.sensor import InputNoise, Mask, lengths_of_rest
 
 # Drawn errors, and their seed.
-DRAWN_ERRORS, SEED_OF_ERRORS = 16, 1
+DRAWN_ERRORS, DRAWN_ANSWERS, SEED_OF_ERRORS = 16, 8, 1
 # So many neighbouring second differences share a size; the sizes are estimated in so many rounds.
 SHARING, ROUNDS = 9, 40
 # Weights of neighbours in first and second differences.
@@ -202,6 +202,23 @@ def answers_to_cosines(
         if seen < SMALLEST_SEEN:
             break
     return [np.array(column) for column in columns]
+
+
+def moved_by_draws(
+    ready: ReadyRecord, signals: Sequence[Replay], candidate: Array, noise: Mapping[str, InputNoise]
+) -> list[float]:  # fmt: skip
+    """Return how far drawn errors of the inputs move each signal of a record, of few the farthest, rms [its unit]."""
+    ready, rng = replace(ready, record=estimated(ready.record, noise)), np.random.default_rng(SEED_OF_ERRORS)
+    whole, squares = candidate[np.newaxis], np.zeros((DRAWN_ANSWERS, len(signals)))
+    exact = [r.seen(ready.runs(whole))[0] for r in signals]
+    drawn = {name: [piece.smoothed[name].errors(DRAWN_ANSWERS, rng) for piece in ready.record.pieces] for name in noise}
+    for k in range(DRAWN_ANSWERS):
+        record = ready.record
+        for name, errors in drawn.items():
+            record = with_changes(record, name, [each[:, k] for each in errors])
+        runs = replace(ready, record=record).runs(whole)
+        squares[k] = [np.mean(np.nan_to_num(r.seen(runs)[0] - y) ** 2) for r, y in zip(signals, exact, strict=True)]
+    return [float(x) for x in np.sqrt(squares.max(axis=0))]
 
 
 def root_of_correlation(known: Smoothed, n: int, step: float) -> Array:

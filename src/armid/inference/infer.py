@@ -13,7 +13,7 @@ from armid.errors import ArmidError, nearest
 from armid.estimation.constants import NAMED
 from armid.estimation.corrections import rms
 from armid.estimation.information import NORMAL_95
-from armid.estimation.input_noise import estimated, pooled_noise
+from armid.estimation.input_noise import estimated, moved_by_draws, pooled_noise
 from armid.estimation.least_squares import Estimates, with_fitted_starts
 from armid.estimation.noise_model import NoiseModel, levels_in_motion, levels_left
 from armid.inference.candidates import constant_effects
@@ -43,6 +43,7 @@ from armid.inference.unknowns import freed
 from armid.inference.whitening import whitened, with_answers
 from armid.model import EFFECTS, Effect, Model
 from armid.model.effects.sensor import sensor_effects
+from armid.problem.problem import by_record
 from armid.problem.space import Space
 from armid.record import Campaign
 
@@ -414,6 +415,19 @@ def matters(library: Library, fit: Fit) -> bool:
     return any(level.moved > TRIFLE * left for level, left in moved_and_left(library, fit))
 
 
+def may_matter(library: Library, fit: Fit) -> bool:
+    """Tell whether noise of the inputs may be more than a trifle of what a model leaves, from a few drawn errors.
+
+    What it does to each sample takes a simulation for each of its waves, which a trifle is not worth.
+    """
+    noise = pooled_noise(library.data.records)
+    left = dict(zip(fit.records.replays, train_residuals(fit).raw, strict=True))
+    records = by_record(fit.records.replays).items() if noise else ()
+    moved = [(r, by) for ready, signals in records
+             for r, by in zip(signals, moved_by_draws(ready, signals, fit.candidate, noise), strict=True)]  # fmt: skip
+    return any(by > TRIFLE * rms(left[r]) for r, by in moved)
+
+
 def moved_and_left(library: Library, fit: Fit) -> list[tuple[NoiseModel, float]]:
     """Return of each signal its noise and what a model leaves of it, rms [its unit]."""
     pairs = zip(library.data.levels, train_residuals(fit).raw, strict=True)
@@ -459,7 +473,7 @@ def with_noise_in_motion(library: Library, inference: Inference) -> Library:
 
 def with_input_noise(library: Library, fit: Fit) -> Library:
     """Return the library whose inputs count as measured with noise, where what a fit leaves may show it."""
-    if library.as_read is not None or not pooled_noise(library.data.records) or not is_significant(fit):
+    if library.as_read is not None or not is_significant(fit) or not may_matter(library, fit):
         return library
     with_noise = with_measured_inputs(library, fit)
     if not matters(with_noise, fit):
