@@ -11,6 +11,7 @@ from armid.inference import prepared
 from armid.inference.candidates import EffectKey
 from armid.inference.checks import holdout_residuals
 from armid.inference.kinds.effects import hypotheses
+from armid.inference.kinds.same_law import done_together
 from armid.inference.model import unless_diverged
 from armid.inference.whitening import WhiteRecords, whitened
 from armid.loop import close_loop
@@ -142,15 +143,13 @@ def test_dry_friction_of_the_machine_is_not_looked_for_and_improbable_in_another
     library, _ = prepared(Model(declared.plant) + own, declared, candidates)
     assert {(k.public, k.form): (d.name, d.exactly) for k, d in library.doubles.items()} == {
         ("coulomb", ""): ("bearing.level", False), ("coulomb", "tanh"): ("bearing.level", True),
-        ("coulomb", "arctan"): ("bearing.level", False),
-        ("drive_gain", ""): ("a change of mass and bearing.level together", True)}  # fmt: skip
-    assert library.left_out == {EffectKey("coulomb", "tanh"): "bearing.level",
-                                EffectKey("drive_gain"): "a change of mass and bearing.level together"}  # fmt: skip
+        ("coulomb", "arctan"): ("bearing.level", False)}  # fmt: skip
+    assert library.left_out == {EffectKey("coulomb", "tanh"): "bearing.level"}
     priors = {(k.public, k.form): h.log_prior for k, h in hypotheses(library).items()}
     assert priors["coulomb", ""] < priors["presliding", ""]
 
 
-def test_an_effect_that_all_free_parameters_do_together_is_not_looked_for(tmp_path):
+def test_no_record_tells_an_effect_from_what_all_free_parameters_do_together(tmp_path):
     """A gain of the drive scales inertia, damping and weight: with one of these known it is another matter."""
     times, rng = 0.02 * np.arange(200), np.random.default_rng(6)
     table = {"time_s": times, "angle_rad": np.sin(times) + 1e-3 * rng.standard_normal(200), "drive_N_m": np.cos(times)}
@@ -162,7 +161,6 @@ def test_an_effect_that_all_free_parameters_do_together_is_not_looked_for(tmp_pa
     found = []
     for i, known in enumerate(("", "[parameters]\ndamping = { fixed = 0.1 }\n")):
         arm = read_campaign(write_records(tmp_path / f"{i}", head + known, tables, holdout=0))
-        library, _ = prepared(Model(arm.plant), arm, candidates)
-        found.append({key.public: name for key, name in library.left_out.items()})
-    together = "a change of inertia, gravity_moment and damping together"
-    assert found == [{"drive_gain": together}, {}]
+        library, fit = prepared(Model(arm.plant), arm, candidates)
+        found.append({key.public: names for key in library.joinable(()) if (names := done_together(fit, key, library))})
+    assert found == [{"drive_gain": ("inertia", "gravity_moment", "damping")}, {}]

@@ -14,14 +14,13 @@ from armid.estimation.noise_model import Level, level_of, level_weights
 from armid.model import Array
 from armid.problem.problem import Replay, by_record
 from armid.problem.space import Space
+from armid.report.document import LEFT_OF_MOVED
 
 NORMAL_95 = 1.959963984540054
 # Directions whose information is below this share of the strongest is rounding.
 SINGULAR = 1e-13
 # Parameters of a larger correlation than this are hardly separated.
 CORRELATED = 0.95
-# Share of what noise of the inputs does, rms, that must show in what is left where it would be larger than the noise.
-LEFT_OF_MOVED = 0.25
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from armid.inference.decisions import CLAIMED, DENIED, MENTIONED, OVER_NOISE, WI
 from armid.inference.infer import Inference, infer, prepared
 from armid.inference.kinds.hypothesis import Hypotheses, Hypothesis, words
 from armid.inference.kinds.missing_signal import missing_from
+from armid.inference.kinds.same_law import done_together
 from armid.inference.library import Library, calibrated_replays
 from armid.inference.model import (
     Fit,
@@ -50,6 +51,7 @@ from armid.model import Array, Effect, Model
 from armid.problem.problem import by_output
 from armid.problem.starts import with_starts
 from armid.record import Campaign, Record
+from armid.report.document import listed
 from armid.units import behind
 
 # Mistakes of the data checks that leave nothing to search for, and what it tells whatever the loop finds.
@@ -181,7 +183,7 @@ def close_loop(
         *limits_of(after),
         *dict.fromkeys(again),
     )
-    together = known_together(in_force, inference.exploration.library)
+    together = (*known_together(in_force, inference.exploration.library), *beyond_records(inference))
     return ClosedLoop(campaign, verdicts[0], verdicts[1:], judged[0], after, steps[:kept], withdrawn, advice,
                       next_steps, together, tuple(suspects), errors, inference, missing)  # fmt: skip
 
@@ -395,6 +397,21 @@ def known_together(fit: Fit, library: Library) -> tuple[str, ...]:
     basis, _ = decomposed(np.column_stack(strengths))
     products = [replace(p, slope=beyond(basis, p.slope)) for p in fit.products(library.tolerances)]
     return (*common_factors(tuple(own), beyond(basis, np.column_stack([*own.values()])), products), *doubles)
+
+
+def beyond_records(inference: Inference) -> tuple[str, ...]:
+    """Return in words which listed effects no such record tells from other values of the parameters."""
+    model, exploration = inference.in_force, inference.exploration
+    fit, waiting = exploration.fits[model], inference.probabilities["effects"].keys() - {h.name for h in model}
+    texts = []
+    for key in exploration.library.joinable(fit.active):
+        if key.public in waiting:
+            waiting = waiting - {key.public}
+            names = done_together(fit, key, exploration.library)
+            if names:
+                texts.append(f"no record tells {key.public} from other values of {listed(names)}: the intervals hold "
+                             "both; leave it out (without) where you know that there is none")  # fmt: skip
+    return tuple(texts)
 
 
 def slope(fit: Fit, records: WhiteRecords, name: str, size: float) -> Array:

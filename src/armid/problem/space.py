@@ -131,6 +131,10 @@ def space_of(
             space = space.with_bounds(name, low, space.high[i] if override.high is None else override.high)
         if override.fixed is not None:
             space = space.with_fixed(name, override.fixed)
+    for name in (*(bounds or {}), *(fixed or {})):
+        if name in model.constants and name not in model.parameters:
+            raise ModelError(f"'{name}' is a constant of {model.plant.name}, no parameter: it is expected under "
+                             "[constants] of the campaign")  # fmt: skip
     for name, (low, high) in (bounds or {}).items():
         if name in (fixed or {}):
             raise ModelError(f"parameter '{name}' is given both bounds and a fixed value: one of them is expected")

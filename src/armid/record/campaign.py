@@ -165,10 +165,14 @@ def read_campaign(
     folder = f"{above if above.isprintable() else quoted(above)}/" if above else ""
     where = f"{folder}{toml.name}"
 
-    def source(file: str, at: str) -> Callable[[float | None], CsvTable]:
-        return partial(read_table, record_path(toml.parent, file, at), f"{folder}{file}")
+    given = load_toml(toml, where)
+    entries = given.get("records", [])
+    named = {str(one.get("file")) for one in (entries if isinstance(entries, list) else []) if isinstance(one, Mapping)}
 
-    return campaign_of(load_toml(toml, where), source, toml.parent, where, plants, effects)
+    def source(file: str, at: str) -> Callable[[float | None], CsvTable]:
+        return partial(read_table, record_path(toml.parent, file, at, named), f"{folder}{file}")
+
+    return campaign_of(given, source, toml.parent, where, plants, effects)
 
 
 @caused_by(DataError)

@@ -2,7 +2,7 @@
 
 import os.path
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path, PurePosixPath, PureWindowsPath
@@ -434,7 +434,8 @@ def campaign_path(path: str | Path) -> Path:
     return Path(path) / CAMPAIGN_FILE
 
 
-def record_path(folder: Path, file: str, where: str) -> Path:
+def record_path(folder: Path, file: str, where: str, named: Collection[str] = ()) -> Path:
+    """Return where a record is; named: the files of all records, which are none that may be meant instead."""
     pure = PurePosixPath(file.replace("\\", "/"))
     if pure.is_absolute() or PureWindowsPath(file).drive or ".." in pure.parts:
         raise ArmidError(f"{where}: file {quoted(file)} leads out of the campaign's folder, a file inside is expected")
@@ -444,11 +445,12 @@ def record_path(folder: Path, file: str, where: str) -> Path:
         )
     path = os.path.join(folder, file)
     if not os.path.isfile(path):
-        files = sorted(p.name for p in folder.glob(f"*{CSV_SUFFIX}") if p.is_file())
+        files = sorted(p.name for p in folder.glob(f"*{CSV_SUFFIX}") if p.is_file() and p.name not in named)
         if os.path.lexists(path):
             raise ArmidError(f"{where}: file {quoted(file)} does not exist: a folder or a dead link has that name, a "
                              "CSV file is expected")  # fmt: skip
-        raise ArmidError(f"{where}: file {quoted(file)} does not exist, {nearest(file, files)}")
+        hint = nearest(file, files) if files else "and no other CSV file is in that folder"
+        raise ArmidError(f"{where}: file {quoted(file)} does not exist, {hint}")
     real = Path(os.path.realpath(path))
     if not real.is_relative_to(os.path.realpath(folder)):
         raise ArmidError(f"{where}: file {quoted(file)} links out of the campaign's folder, a file inside is expected")

@@ -239,7 +239,8 @@ class Study:
         if not all(case.suite for case in self.cases):
             return total
         seconds = sum(n * first_of(p.problem_name).cost_s for case, n in budgets.items() if (p := case.suite))
-        return (f"{total}; they take the engine about {seconds / 60.0:.3g} min of one processor, to which comes what "
+        time = f"{seconds / 60.0:.3g} min" if seconds >= 60.0 else f"{seconds:.2g} s"
+        return (f"{total}; they take the engine about {time} of one processor, to which comes what "
                 "the identifiers themselves need")  # fmt: skip
 
     def description(self, _: Path = Path()) -> dict[str, Any]:

@@ -7,8 +7,8 @@ parameter changes all rates and outputs as the effect does. Then also while some
 wrong gain of the drive looks like another mass only until something else acts. An effect in exactly the form of a
 parameter is not tried. One in another form (a sign that is smoothed otherwise) is improbable.
 
-Nor is one tried that all free parameters do together (a gain of the drive, where all that it moves is to be
-identified): records give only ratios of such strengths, and those of what else acts are free as well.
+What all free parameters do together (a gain of the drive, where all that it moves is to be identified) no record tells
+from it: records give only ratios of such strengths. It is tried, as the intervals have to hold both.
 """
 
 from collections.abc import Collection, Iterable, Mapping
@@ -104,11 +104,31 @@ def doubles(fit: Fit, library: Library) -> dict[EffectKey, Double]:
         if id(records.model) not in known:
             states = scattered(records, candidate_at(records, values))
             known[id(records.model)] = states, states.changes(own)
-        states, changes = known[id(records.model)]
-        one = double(records, key, states, changes, library)
-        one = one or of_all(records, key, states, {n: changes[n] for n in values}, library)
+        one = double(records, key, *known[id(records.model)], library)
         found |= {key: one} if one else {}
     return found
+
+
+def done_together(fit: Fit, key: EffectKey, library: Library) -> tuple[str, ...]:
+    """Return the parameters of a model that do together exactly what an effect does, empty where they do not."""
+    values = {name: value for name, value in fit.values.items() if name not in library.own_shapes}
+    records = records_with(fit, (*fit.active, key), library)
+    name = only_strength(records, key)
+    if name is None:
+        return ()
+    states = scattered(records, candidate_at(records, values))
+    change = states.change(name, library.strength_of(name, records.model.parameters[name])).ravel()
+    columns = np.column_stack([x.ravel() for x in states.changes(values).values()])
+    good = np.isfinite(change) & np.isfinite(columns).all(axis=1)
+    change, columns = change[good], columns[good]
+    sizes = np.linalg.norm(columns, axis=0)
+    if not (change.any() and sizes.all()):
+        return ()
+    shares = np.linalg.lstsq(columns / sizes, change, rcond=None)[0]
+    left = change - columns / sizes @ shares
+    if left @ left > ROUNDING_OF_LAW * (change @ change):
+        return ()
+    return tuple(n for n, share in zip(values, shares, strict=True) if share**2 > ROUNDING_OF_LAW * np.max(shares**2))
 
 
 def double(
@@ -140,28 +160,6 @@ def only_strength(records: WhiteRecords, key: EffectKey) -> str | None:
     own = [n for n in records.space.names if key.owns(n)]
     strengths = [n for n in own if declared[n].null is not None]
     return strengths[0] if len(strengths) == 1 and all(declared[n].unit != "s" for n in own) else None
-
-
-def of_all(
-    records: WhiteRecords, key: EffectKey, alone: States, own: Mapping[str, Array], library: Library
-) -> Double | None:  # fmt: skip
-    """Return which free parameters do together exactly what an effect does, None where they do not."""
-    name = only_strength(records, key)
-    if name is None or not own:
-        return None
-    change = alone.change(name, library.strength_of(name, records.model.parameters[name])).ravel()
-    columns = np.column_stack([x.ravel() for x in own.values()])
-    good = np.isfinite(change) & np.isfinite(columns).all(axis=1)
-    change, columns = change[good], columns[good]
-    sizes = np.linalg.norm(columns, axis=0)
-    if not (change.any() and sizes.all()):
-        return None
-    shares = np.linalg.lstsq(columns / sizes, change, rcond=None)[0]
-    left = change - columns / sizes @ shares
-    if left @ left > ROUNDING_OF_LAW * (change @ change):
-        return None
-    *names, last = (n for n, share in zip(own, shares, strict=True) if share**2 > ROUNDING_OF_LAW * np.max(shares**2))
-    return Double(f"a change of {', '.join(names)} and {last} together" if names else last, True)
 
 
 def scattered(records: WhiteRecords, candidate: Array) -> States:
