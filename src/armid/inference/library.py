@@ -442,6 +442,11 @@ def finest(*calibrations: Sequence[Calibration]) -> tuple[Calibration, ...]:
     return tuple(max(each, key=lambda one: one.schedule.substeps) for each in zip(*calibrations, strict=True))
 
 
+def one(run: Simulation, i: int) -> Simulation:
+    """Return a simulation of one candidate."""
+    return replace(run, outputs=run.outputs[:, i : i + 1], failed=run.failed[i : i + 1])
+
+
 def quickly_calibrated(
     model: Model, manoeuvre: Manoeuvre, spread: Array, rms: Array | None = None, accuracy: str = STANDARD
 ) -> Calibration:
@@ -471,19 +476,20 @@ def quickly_calibrated(
         if good:
             break
     schedule = Schedule(n, weights=switch_weights(spread, runs[n]))
-    if good and n >= FEWEST_SPARED:
+    sound = np.array([judged(one(runs[n], i), one(runs[2 * n], i))[2] for i in range(len(spread))])
+    if n >= FEWEST_SPARED and sound.any():
         # Where steps are fine for the sake of a few samples (friction as it changes its sign), only these need be cut,
-        # and as finely as all would have to be.
+        # and as finely as all would have to be. What the finest steps do not follow judges none.
         schedule = replace(schedule, refinement=max(schedule.refinement, n))
-        sound = spread[~runs[2 * n].failed]
-        states = simulate(model, manoeuvre, sound, Schedule(2 * n), states=True).states
-        ranges = np.array([np.max(np.ptp(state, axis=-1)) for state in states.values()])
+        finer = simulate(model, manoeuvre, spread[sound], Schedule(2 * n), states=True)
+        ranges = np.array([np.max(np.ptp(state, axis=-1)) for state in finer.states.values()])
         for share in SHARES_OF_ERROR:
             tried = replace(schedule, rough=np.where(ranges > 0.0, share * ranges, np.inf))
-            run = simulate(model, manoeuvre, spread, tried)
-            judgement = judged(run, runs[2 * n])
+            run = simulate(model, manoeuvre, spread[sound], tried)
+            judgement = judged(run, finer)
             if judgement[2] and run.n_steps < n:
-                schedule, (error, is_hidden, _) = tried, judgement
+                schedule = tried
+                error, is_hidden = judgement[:2] if good else (error, is_hidden)
                 break
     return Calibration(schedule, error, is_hidden or bool(error <= allowed))
 
