@@ -338,7 +338,7 @@ def test_a_conclusion_is_what_the_tests_say():
     assert "on the train records is noise" in missed
     assert "on those held out, but their error is less than 1.1 times the noise" in missed
     little = concluded("no_discrepancy", shows_on_train=True)
-    assert "is larger than noise by too little to matter (chance 0.002): nothing is missing" in little
+    assert "is a little more than noise (chance 0.002), too little to name a cause: nothing is missing" in little
     assert little.endswith("mass is 3.0 standard deviations below its declared value (-6.0%).")
     predicts = "that with a + b predicts parts left out of the fit best"
     assert concluded("partly_explained", ("a", "b")).endswith(f"{predicts}: no name is claimed.")

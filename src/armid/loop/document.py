@@ -439,7 +439,7 @@ def nothing_missing(loop: ClosedLoop) -> str:
 
 def as_noise(loop: ClosedLoop) -> str:
     seen = loop.after.diagnosis
-    return f"is larger than noise by too little to matter (chance {seen.p:.2g})" if seen.significant else "is noise"
+    return f"is a little more than noise (chance {seen.p:.2g}), too little to name a cause" if seen.significant else "is noise"
 
 
 def declared_by(loop: ClosedLoop) -> str:
