@@ -439,7 +439,8 @@ def nothing_missing(loop: ClosedLoop) -> str:
 
 def as_noise(loop: ClosedLoop) -> str:
     seen = loop.after.diagnosis
-    return f"is a little more than noise (chance {seen.p:.2g}), too little to name a cause" if seen.significant else "is noise"
+    more = f"is a little more than noise (chance {seen.p:.2g}), too little to name a cause"
+    return more if seen.significant else "is noise"
 
 
 def declared_by(loop: ClosedLoop) -> str:

@@ -275,7 +275,8 @@ def estimates(
         if held[space.free_names.index(name)]:
             doubts.append(SEARCHED if owner is not None and name in library.fixed_shapes(owner) else HELD)
         if not max(value - low, high - value) <= within * abs(value):
-            doubts.append(f"its interval reaches more than {within:.0%} away from the value")
+            why = f" (mostly: {causes[0].rpartition(', ')[0]})" if seen and seen[0][1] > 0.5 else ""
+            doubts.append(f"its interval reaches more than {within:.0%} away from the value{why}")
         ends, of_noise = shown_ends(low, high), shown_ends(one.noise_low, one.noise_high)
         estimates.append(Estimate(public, value, unit, *ends, tuple(doubts), *of_noise, causes=causes))
     return tuple(estimates)
