@@ -312,9 +312,11 @@ def convergence_remarks(identification: Identification) -> list[str]:
                     "may get there.")  # fmt: skip
     train, unseen = identification.train.chi2_per_sample, identification.holdout
     holdout = None if unseen is None else unseen.chi2_per_sample
-    if train is not None and holdout is not None and holdout > CARRIES_OVER * max(train, 1.0):
-        known, left = identification.outputs, {} if unseen is None else unseen.outputs
-        missed = {name: e.rmse for name, e in left.items() if e.rmse > CARRIES_OVER * known[name]["noise_rms"]}
+    if unseen is None or train is None or holdout is None:
+        return texts
+    if holdout > CARRIES_OVER * max(train, 1.0):
+        known = identification.outputs
+        missed = {n: e.rmse for n, e in unseen.outputs.items() if e.rmse > CARRIES_OVER * known[n]["noise_rms"]}
         may = missed and all(
             may_be_inputs(known[n]["noise_rms"], known[n]["moved_by_inputs"], x) for n, x in missed.items()
         )

@@ -14,6 +14,7 @@ from armid.estimation.noise_model import Level, level_of, level_weights
 from armid.model import Array
 from armid.problem.problem import Replay, by_record
 from armid.problem.space import Space
+from armid.record import Piece
 from armid.report.document import LEFT_OF_MOVED
 
 NORMAL_95 = 1.959963984540054
@@ -192,38 +193,33 @@ def deviation_by_inputs(replays: tuple[Replay, ...], space: Space, x: Array, lev
     residual, jacobian = records.residual_and_slopes(z)
     covariance = inverse(jacobian.T @ jacobian)
     covariance = np.where(np.isfinite(covariance), covariance, 0.0)
-    moved, left = np.zeros(len(x)), 0.0
+    moved, left, counts = np.zeros(len(x)), 0.0, [r.record.n_samples for r in replays]
+    first = dict(zip(replays, np.cumsum(counts) - counts, strict=True))
     for ready, outputs in by_record(replays).items():
-        signals = answers(ready, outputs, records.whole(z[np.newaxis])[0], noise, [r.record.noise.rms for r in outputs])
-        for index, piece in enumerate(signals):
-            changes = np.array([records.weighted(each) for each in changes_of_piece(records, outputs, index, piece)])
-            shifts = covariance @ (jacobian.T @ changes.T)
+        sizes = [r.record.noise.rms for r in outputs]
+        for index, piece in enumerate(answers(ready, outputs, records.whole(z[np.newaxis])[0], noise, sizes)):
+            begins = [first[r] + sum(r.record.lengths[:index]) for r in outputs]
+            rows = np.concatenate(
+                [a + np.arange(r.record.lengths[index]) for a, r in zip(begins, outputs, strict=True)]
+            )
+            columns = beyond_start(ready.record.pieces[index], piece)
+            changes = np.vstack([records.weights[replays.index(r)] * c for r, c in zip(outputs, columns, strict=True)])
+            slopes = jacobian[rows].T @ changes
+            shifts = covariance @ slopes
             moved += np.sum(shifts**2, axis=1)
-            left += float(np.sum((changes.T - jacobian @ shifts) ** 2)) / len(residual)
+            left += float(np.sum(changes**2) - np.sum(slopes * shifts)) / len(residual)
     shows = np.mean(residual**2) > 1.0 + LEFT_OF_MOVED**2 * left
     return np.sqrt(moved) * records.span if shows or left < 1.0 else np.zeros(len(x))
 
 
-def changes_of_piece(
-    records: LeastSquaresProblem, outputs: Sequence[Replay], index: int, columns: Sequence[Array]
-) -> Iterator[list[Array]]:  # fmt: skip
-    """Yield, for each column, how all signals change where those of one piece do, its start being fitted again.
-
-    columns: of each output of the record, (n_samples, n).
-    """
-    correction = outputs[0].record.pieces[index].correction
-    if correction is not None:
-        seen = np.concatenate(columns)
-        lacking = -correction.gain @ seen
-        pairs = zip(columns, correction.slopes.swapaxes(0, 1), correction.samples, strict=True)
-        columns = [each + slopes[:, samples].T @ lacking for each, slopes, samples in pairs]
-    for column in range(columns[0].shape[1]):
-        changes = [np.zeros(r.record.n_samples) for r in records.replays]
-        for change, r in zip(changes, records.replays, strict=True):
-            if r in outputs:
-                first = sum(r.record.lengths[:index])
-                change[first : first + r.record.lengths[index]] = columns[outputs.index(r)][:, column]
-        yield changes
+def beyond_start(piece: Piece, columns: Sequence[Array]) -> Sequence[Array]:
+    """Return changes of a piece's signals, of each output (n_samples, n), with its start fitted to them again."""
+    correction = piece.correction
+    if correction is None:
+        return columns
+    lacking = -correction.gain @ np.concatenate(columns)
+    pairs = zip(columns, correction.slopes.swapaxes(0, 1), correction.samples, strict=True)
+    return [each + slopes[:, samples].T @ lacking for each, slopes, samples in pairs]
 
 
 def inverse(matrix: Array) -> Array:

@@ -76,17 +76,17 @@ class States:
         """Return the same states with other parameters or constants; changes: name -> what is added."""
         return replace(self, values={**self.values, **{flat(n): self.values[flat(n)] + x for n, x in changes.items()}})
 
-    def change(self, name: str, size: float) -> Array:
+    def change(self, name: str, size: float, both: bool = False) -> Array:
         """Return the change of rates and outputs by a change of a parameter or constant, (n, n_states).
 
-        Each over its size.
+        Each over its size. both: the mean of a change to either side, without what bends.
         """
-        after, before = (self.moved({name: sign * CHANGED * size}).rates for sign in (1.0, -1.0))
-        return np.array([(after[key] - before[key]) / (size_of(rate) or 1.0) for key, rate in self.rates.items()])
+        ends = [self.moved({name: step * CHANGED * size}).rates for step in ((0.5, -0.5) if both else (1.0, 0.0))]
+        return np.array([(ends[0][key] - ends[1][key]) / (size_of(rate) or 1.0) for key, rate in self.rates.items()])
 
-    def changes(self, own: Iterable[str]) -> dict[str, Array]:
+    def changes(self, own: Iterable[str], both: bool = False) -> dict[str, Array]:
         """Return the change by each of some parameters and constants."""
-        return {n: self.change(n, self.values[flat(n)] or 1.0) for n in own}
+        return {n: self.change(n, self.values[flat(n)] or 1.0, both) for n in own}
 
 
 def doubles(fit: Fit, library: Library) -> dict[EffectKey, Double]:
@@ -118,7 +118,7 @@ def done_together(fit: Fit, key: EffectKey, library: Library) -> tuple[str, ...]
         return ()
     states = scattered(records, candidate_at(records, values))
     change = states.change(name, library.strength_of(name, records.model.parameters[name])).ravel()
-    columns = np.column_stack([x.ravel() for x in states.changes(values).values()])
+    columns = np.column_stack([x.ravel() for x in states.changes(values, both=True).values()])
     good = np.isfinite(change) & np.isfinite(columns).all(axis=1)
     change, columns = change[good], columns[good]
     sizes = np.linalg.norm(columns, axis=0)
