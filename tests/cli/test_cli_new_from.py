@@ -197,3 +197,14 @@ def test_a_position_of_a_linear_axis_is_what_the_plant_of_a_plug_in_reads(run, r
     assert run("check", "mine", "--plugin", "slide.py:slide").code == 0
     write(Path("b.csv"), "t_s,motor_V,turn_deg", times, drive, angle)
     assert "slide_m" in refused("new", "campaign", "other", "--from", "b.csv", "--plugin", "slide.py:slide")
+
+
+def test_a_file_whose_names_are_the_outputs_of_a_shipped_plant_is_of_that_plant(run, tmp_path):
+    times, drive, _, angle = wheel(5)
+    write(tmp_path / "a.csv", "time_s,current_A,hub_angle_deg,deflection_deg", times, drive, angle, 0.1 * angle)
+    assert run("new", "campaign", "shaft", "--from", "a.csv").code == 0
+    text = (tmp_path / "shaft" / "campaign.toml").read_text()
+    assert 'plant = "flexible_link"  # GUESS' in text
+    assert "not used" not in text
+    signals = read_campaign(tmp_path / "shaft").train[0].signals
+    assert [s.header for s in signals] == ["hub_angle_deg", "deflection_deg"]

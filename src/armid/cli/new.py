@@ -21,7 +21,7 @@ import numpy as np
 from armid.cli.listing import things_of
 from armid.cli.options import command, completes, examples, give, plugin_option, say
 from armid.errors import ArmidError, quoted, refuse_unless_known
-from armid.model import Array, Plant
+from armid.model import PLANTS, Array, Plant
 from armid.model.effect import RESERVED_WORDS
 from armid.model.parameter import check_name
 from armid.record.reader import wraps_at
@@ -281,6 +281,7 @@ def guessed_campaign(
             raise ArmidError(f"{quoted(file)} is there twice: files of different names are expected")
     tables = [read_table(file, file.name) for file in files]
     notes: list[str] = []
+    own, plant = plant, plant or plant_of(tables[0])
     if plant is None:
         roles = roles_of(tables[0])
         linear = moves_straight(roles, tables[0])
@@ -289,7 +290,8 @@ def guessed_campaign(
         roles, headers = roles_in(tables[0], plant, notes)
         inputs = [i.name for i in plant.inputs if i.name in roles]
         named = [f'{i} = "{headers[i]}"' for i in inputs]
-    model = GUESSED_MODELS[linear] if plant is None else (f'plant = "{plant.name}"',)
+    guess = "" if own else "  # GUESS: it has outputs of these names"
+    model = GUESSED_MODELS[linear] if plant is None else (f'plant = "{plant.name}"{guess}',)
     renamed = {roles[quantity].header: header for quantity, header in headers.items()}
     drives = {headers[i]: roles[i].factor for i in inputs}
     second = seconds_of(roles["time"], tables[0], notes)
@@ -305,6 +307,24 @@ def guessed_campaign(
     open_drives = [headers[i] for i in inputs if i not in known]
     hold = [guessed_hold(written.values(), open_drives)] if open_drives else []
     return guessed_text(name, tables, written, renamed, [*drives], notes, [*model, *hold], named), written
+
+
+def plant_of(table: CsvTable) -> Plant | None:
+    """Return the plant of armid that reads several outputs of a file and its inputs by their names, None for none.
+
+    Of a machine that is guessed, one speed and one position are read.
+    """
+
+    def n_read(plant: Plant) -> int:
+        return sum(any(header in table.headers for header in o.factors) for o in plant.outputs)
+
+    def is_driven(plant: Plant) -> bool:
+        return all(any(h in table.headers for h in i.columns) for i in plant.inputs if i.required)
+
+    columns = [column_of(header) for header in table.columns]
+    n_guessed = len({quantity_of(c) for c in columns} & {"speed", "position"})
+    likely = [plant for plant in PLANTS.values() if is_driven(plant) and n_read(plant) > n_guessed]
+    return max(likely, key=n_read, default=None)
 
 
 def moves_straight(roles: Mapping[str, FileColumn], table: CsvTable) -> bool:
