@@ -103,3 +103,19 @@ def test_the_loop_spares_steps_where_friction_asks_for_many_and_what_is_cut_chan
     misfit = np.sqrt(np.mean((simulate(RUBBED, manoeuvre, line, schedule).output - record) ** 2, axis=1))
     short, long = ((misfit[100 + n : 300 + n] - misfit[100 - n : 300 - n]) / (2 * n) for n in (10, 100))
     assert np.max(np.abs(short - long)) < 1e-2 * np.max(np.abs(long))
+
+
+def test_steps_are_spared_where_more_than_eight_are_asked_for_and_next_to_what_no_steps_follow():
+    manoeuvre, candidates = rubbing()
+    sharp, width = candidates[:8].copy(), list(RUBBED.parameters).index("coulomb.width")
+    sharp[:, width] /= 4.0
+    stiff = np.vstack([sharp, sharp[:1]])
+    stiff[-1, width] = 1e-5
+    for tried, is_reached in ((sharp, True), (stiff, False)):
+        found = quickly_calibrated(RUBBED, manoeuvre, tried)
+        assert found.reached == is_reached
+        assert found.schedule.rough is not None
+        assert found.schedule.refinement >= found.schedule.substeps > 8
+        run, finest = (simulate(RUBBED, manoeuvre, sharp, s) for s in (found.schedule, Schedule(128)))
+        assert run.n_steps < 0.6 * found.schedule.substeps
+        assert np.abs(run.output - finest.output).max() < 5e-6 * RUBBED.plant.sizes[0]
