@@ -169,8 +169,8 @@ def test_an_interval_holds_what_noise_of_an_input_does_where_fitted_starts_and_t
         inside += [p.low <= true <= p.high and p.interval_holds for p, true in
                    ((fit.parameters["inertia"], INERTIA), (fit.parameters["damping"], DAMPING))]  # fmt: skip
         alone += list(np.abs(off) <= fit.information.half_width)
-        said = " ".join(ranked(fit))
-        assert ("Noise of the inputs moves" in said) == (measured is noisy)
+        text = " ".join(ranked(fit))
+        assert ("Noise of the inputs moves" in text) == (measured is noisy)
     assert sum(inside) >= 7
     assert (sum(alone) <= 5) == (measured is noisy)
 

@@ -281,7 +281,7 @@ def guessed_campaign(
             raise ArmidError(f"{quoted(file)} is there twice: files of different names are expected")
     tables = [read_table(file, file.name) for file in files]
     notes: list[str] = []
-    own, plant = plant, plant or plant_of(tables[0])
+    is_given, plant = plant is not None, plant or plant_of(tables[0])
     if plant is None:
         roles = roles_of(tables[0])
         linear = moves_straight(roles, tables[0])
@@ -290,7 +290,7 @@ def guessed_campaign(
         roles, headers = roles_in(tables[0], plant, notes)
         inputs = [i.name for i in plant.inputs if i.name in roles]
         named = [f'{i} = "{headers[i]}"' for i in inputs]
-    guess = "" if own else "  # GUESS: it has outputs of these names"
+    guess = "" if is_given else "  # GUESS: it has outputs of these names"
     model = GUESSED_MODELS[linear] if plant is None else (f'plant = "{plant.name}"{guess}',)
     renamed = {roles[quantity].header: header for quantity, header in headers.items()}
     drives = {headers[i]: roles[i].factor for i in inputs}
@@ -310,9 +310,9 @@ def guessed_campaign(
 
 
 def plant_of(table: CsvTable) -> Plant | None:
-    """Return the plant of armid that reads several outputs of a file and its inputs by their names, None for none.
+    """Return the plant of armid that reads several outputs of a file and its inputs by their names, or None.
 
-    Of a machine that is guessed, one speed and one position are read.
+    It has to read more columns than the guess of a machine from the words of its headers.
     """
 
     def n_read(plant: Plant) -> int:

@@ -86,9 +86,15 @@ def data_issues(campaign: Campaign, model: Model, space: Space) -> tuple[DataIss
     if not train:
         return (*seen, *times)
     trial = DataTrial(model, space).scaled(train)
-    read = [trial.thinned(r, len(train)) for r in train]
-    train = started(trial, read)
-    issues, z = mistakes(trial, train) if train is read else ([], trial.fit(train)[0])
+    train = [trial.thinned(r, len(train)) for r in train]
+    z, before = trial.fit(train)
+    issues, worst = list[DataIssue](), trial.errors(train, z).max()
+    if worst > TOLERABLE:
+        begun = started(trial, train, worst)
+        if begun is None:
+            issues, z = mistakes(trial, train, z, before)
+        else:
+            train, z = begun
     issues = of_two(issues, train)
     errors = trial.errors(train, z)[0]
     if not issues:
@@ -222,17 +228,18 @@ class DataTrial:
         return self.fit(records, np.vstack([spread, *others]), n_best=N_BEST)
 
 
-def started(trial: DataTrial, train: list[Record]) -> list[Record]:
-    """Return records that start where the declared model's fit starts them, if it explains them so and not as read.
+def started(trial: DataTrial, train: Sequence[Record], worst: float) -> tuple[list[Record], Array] | None:
+    """Return records with fitted starts, and the estimate from these, if that explains the records; else None.
 
     The first samples of a noisy position tell a speed so poorly that a sound record of little friction drifts away.
+    worst: error of the declared model on a record as it was read.
     """
     problem = trial.problem(train)
-    before = trial.errors(train, trial.fit(train)[0]).max() if fits_starts(problem.replays) else 0.0
-    if before <= TOLERABLE:
-        return train
+    if not fits_starts(problem.replays):
+        return None
     ready = [one.record for one in by_record(with_fitted_starts(problem.replays, trial.space))]
-    return ready if trial.errors(ready, trial.fit(ready)[0]).max() <= most_left(before) else train
+    z = trial.fit(ready)[0]
+    return (ready, z) if trial.errors(ready, z).max() <= most_left(worst) else None
 
 
 def placed(trial: DataTrial, record: Record, z: Array) -> Record:
@@ -254,10 +261,10 @@ def most_left(before: float) -> float:
     return min(CORRECTED * before, LEFT)
 
 
-def mistakes(trial: DataTrial, train: Sequence[Record]) -> tuple[list[DataIssue], Array]:
-    z, before = trial.fit(train)
-    if trial.errors(train, z).max() <= TOLERABLE:
-        return [], z
+def mistakes(
+    trial: DataTrial, train: Sequence[Record], z: Array, before: float
+) -> tuple[list[DataIssue], Array]:  # fmt: skip
+    """Return the mistakes of train records, and the estimate that judges others; z, before: a fit and its rms error."""
     # a correction begins at spread candidates, and is compared with what the declared model was there
     below = max(before, min(rms(e) for e in trial.errors(train, trial.spread(train))))
     tried = []

@@ -166,7 +166,7 @@ class Identification(Result):
         if not space.free[i]:
             return ParameterEstimate(value, space.units[i])
         k, doubt, scatter = self.information.names.index(name), self.interval_doubts[name], self.scatter
-        half = NORMAL_95 * float(np.hypot(self.information.deviation[k], self.moved_by_inputs[k]))
+        half = NORMAL_95 * float(np.hypot(self.information.deviation[k], self.deviation_by_inputs[k]))
         low, high = (value - half, value + half) if scatter is None else (scatter.low[k], scatter.high[k])
         known = bool(np.isfinite([low, high]).all())
         return ParameterEstimate(
@@ -209,7 +209,7 @@ class Identification(Result):
         return doubts
 
     @cached_property
-    def moved_by_inputs(self) -> Array:
+    def deviation_by_inputs(self) -> Array:
         """How far noise of the inputs moves the estimate, standard deviations, SI, (n_free,)."""
         levels = tuple(known_level(r) for r in self.train_replays)
         return deviation_by_inputs(self.train_replays, self.space, self.candidate[self.space.free], levels)
@@ -217,7 +217,7 @@ class Identification(Result):
     @property
     def widened_by_inputs(self) -> tuple[str, ...]:
         """Free parameters that noise of the inputs moves by more than noise of the sensors does."""
-        more = self.moved_by_inputs > self.information.deviation
+        more = self.deviation_by_inputs > self.information.deviation
         return tuple(name for name, wider in zip(self.information.names, more, strict=True) if wider)
 
     @property

@@ -12,9 +12,8 @@ from armid.estimation.input_noise import answers, pooled_noise
 from armid.estimation.least_squares import LEAST_DAMPING, LeastSquaresProblem, WeightedRecords, fit, step_in_box
 from armid.estimation.noise_model import Level, level_of, level_weights
 from armid.model import Array
-from armid.problem.problem import Replay, by_record
+from armid.problem.problem import Replay, by_record, samples_of
 from armid.problem.space import Space
-from armid.record import Piece
 from armid.report.document import LEFT_OF_MOVED
 
 NORMAL_95 = 1.959963984540054
@@ -183,7 +182,7 @@ def deviation_by_inputs(replays: tuple[Replay, ...], space: Space, x: Array, lev
     """Return how far noise of the inputs moves an estimate, standard deviations, SI, (n_free,).
 
     To first order, with the starts that are fitted. 0 where all inputs are commands, and where what is left is too
-    small to hold such noise: then they are commands as well.
+    small to hold such noise: the inputs are then commands.
     """
     noise = pooled_noise([ready.record for ready in by_record(replays)])
     if not noise or any(level.rms == 0.0 for level in levels):
@@ -193,33 +192,22 @@ def deviation_by_inputs(replays: tuple[Replay, ...], space: Space, x: Array, lev
     residual, jacobian = records.residual_and_slopes(z)
     covariance = inverse(jacobian.T @ jacobian)
     covariance = np.where(np.isfinite(covariance), covariance, 0.0)
-    moved, left, counts = np.zeros(len(x)), 0.0, [r.record.n_samples for r in replays]
-    first = dict(zip(replays, np.cumsum(counts) - counts, strict=True))
+    moved, left, lengths = np.zeros(len(x)), 0.0, [r.record.n_samples for r in replays]
+    begins = dict(zip(replays, np.cumsum(lengths) - lengths, strict=True))
+    weights = dict(zip(replays, records.weights, strict=True))
     for ready, outputs in by_record(replays).items():
         sizes = [r.record.noise.rms for r in outputs]
-        for index, piece in enumerate(answers(ready, outputs, records.whole(z[np.newaxis])[0], noise, sizes)):
-            begins = [first[r] + sum(r.record.lengths[:index]) for r in outputs]
-            rows = np.concatenate(
-                [a + np.arange(r.record.lengths[index]) for a, r in zip(begins, outputs, strict=True)]
-            )
-            columns = beyond_start(ready.record.pieces[index], piece)
-            changes = np.vstack([records.weights[replays.index(r)] * c for r, c in zip(outputs, columns, strict=True)])
+        for index, columns in enumerate(answers(ready, outputs, records.whole(z[np.newaxis])[0], noise, sizes)):
+            rows = samples_of([int(begins[r]) for r in outputs], [r.record.lengths for r in outputs], index)
+            correction = ready.record.pieces[index].correction
+            seen = columns if correction is None else correction.left_of(columns)
+            changes = np.vstack([weights[r] * each for r, each in zip(outputs, seen, strict=True)])
             slopes = jacobian[rows].T @ changes
             shifts = covariance @ slopes
             moved += np.sum(shifts**2, axis=1)
             left += float(np.sum(changes**2) - np.sum(slopes * shifts)) / len(residual)
     shows = np.mean(residual**2) > 1.0 + LEFT_OF_MOVED**2 * left
     return np.sqrt(moved) * records.span if shows or left < 1.0 else np.zeros(len(x))
-
-
-def beyond_start(piece: Piece, columns: Sequence[Array]) -> Sequence[Array]:
-    """Return changes of a piece's signals, of each output (n_samples, n), with its start fitted to them again."""
-    correction = piece.correction
-    if correction is None:
-        return columns
-    lacking = -correction.gain @ np.concatenate(columns)
-    pairs = zip(columns, correction.slopes.swapaxes(0, 1), correction.samples, strict=True)
-    return [each + slopes[:, samples].T @ lacking for each, slopes, samples in pairs]
 
 
 def inverse(matrix: Array) -> Array:

@@ -185,8 +185,8 @@ def answers_to_cosines(
     From the slowest on until the sensors do not see the answers: each costs a simulation, of all pieces at once. Other
     arguments as for `answers`.
     """
-    whole, known = candidate[np.newaxis], [piece.smoothed[name] for piece in ready.record.pieces]
-    exact = [r.seen(ready.runs(whole))[0] for r in signals]
+    known = [piece.smoothed[name] for piece in ready.record.pieces]
+    exact = signals_seen(ready, signals, candidate)
     most, columns = min(MOST_COSINES, *(one.values.size for one in known)), [list[Array]() for _ in signals]
     for first in range(0, most, AT_ONCE):
         numbers = np.arange(first, min(first + AT_ONCE, most))
@@ -194,10 +194,10 @@ def answers_to_cosines(
         scaled = [w * np.sqrt(np.diag(one.covariance(w, noise.step))) for w, one in zip(waves, known, strict=True)]
         seen = 0.0
         for k in range(len(numbers)):
-            run = replace(ready, record=with_changes(ready.record, name, [w[:, k] for w in scaled])).runs(whole)
-            for column, r, unmoved, size in zip(columns, signals, exact, sizes, strict=True):
-                # a simulation that diverges adds no noise
-                column.append(np.nan_to_num(r.seen(run)[0] - unmoved, posinf=0.0, neginf=0.0))
+            record = with_changes(ready.record, name, [w[:, k] for w in scaled])
+            changes = changes_seen(ready, signals, candidate, record, exact)
+            for column, change, size in zip(columns, changes, sizes, strict=True):
+                column.append(change)
                 seen = max(seen, float(np.sum(column[-1] ** 2)) / size**2)
         if seen < SMALLEST_SEEN:
             break
@@ -209,16 +209,28 @@ def moved_by_draws(
 ) -> list[float]:  # fmt: skip
     """Return how far drawn errors of the inputs move each signal of a record, of few the farthest, rms [its unit]."""
     ready, rng = replace(ready, record=estimated(ready.record, noise)), np.random.default_rng(SEED_OF_ERRORS)
-    whole, squares = candidate[np.newaxis], np.zeros((DRAWN_ANSWERS, len(signals)))
-    exact = [r.seen(ready.runs(whole))[0] for r in signals]
+    squares, exact = np.zeros((DRAWN_ANSWERS, len(signals))), signals_seen(ready, signals, candidate)
     drawn = {name: [piece.smoothed[name].errors(DRAWN_ANSWERS, rng) for piece in ready.record.pieces] for name in noise}
     for k in range(DRAWN_ANSWERS):
         record = ready.record
         for name, errors in drawn.items():
             record = with_changes(record, name, [each[:, k] for each in errors])
-        runs = replace(ready, record=record).runs(whole)
-        squares[k] = [np.mean(np.nan_to_num(r.seen(runs)[0] - y) ** 2) for r, y in zip(signals, exact, strict=True)]
+        squares[k] = [np.mean(x**2) for x in changes_seen(ready, signals, candidate, record, exact)]
     return [float(x) for x in np.sqrt(squares.max(axis=0))]
+
+
+def signals_seen(ready: ReadyRecord, signals: Sequence[Replay], candidate: Array) -> list[Array]:
+    runs = ready.runs(candidate[np.newaxis])
+    return [r.seen(runs)[0] for r in signals]
+
+
+def changes_seen(
+    ready: ReadyRecord, signals: Sequence[Replay], candidate: Array, record: Record, exact: Sequence[Array]
+) -> list[Array]:  # fmt: skip
+    """Return how signals change with other inputs; exact: the signals with those of `ready`."""
+    pairs = zip(signals_seen(replace(ready, record=record), signals, candidate), exact, strict=True)
+    # a simulation that diverges adds no noise
+    return [np.nan_to_num(changed - y, posinf=0.0, neginf=0.0) for changed, y in pairs]
 
 
 def root_of_correlation(known: Smoothed, n: int, step: float) -> Array:

@@ -418,12 +418,11 @@ def matters(library: Library, fit: Fit) -> bool:
 def may_matter(library: Library, fit: Fit) -> bool:
     """Tell whether noise of the inputs may be more than a trifle of what a model leaves, from a few drawn errors.
 
-    What it does to each sample takes a simulation for each of its waves, which a trifle is not worth.
+    The exact answer takes a simulation for each wave of the noise.
     """
     noise = pooled_noise(library.data.records)
     left = dict(zip(fit.records.replays, train_residuals(fit).raw, strict=True))
-    records = by_record(fit.records.replays).items() if noise else ()
-    moved = [(r, by) for ready, signals in records
+    moved = [(r, by) for ready, signals in by_record(fit.records.replays).items()
              for r, by in zip(signals, moved_by_draws(ready, signals, fit.candidate, noise), strict=True)]  # fmt: skip
     return any(by > TRIFLE * rms(left[r]) for r, by in moved)
 
@@ -473,7 +472,9 @@ def with_noise_in_motion(library: Library, inference: Inference) -> Library:
 
 def with_input_noise(library: Library, fit: Fit) -> Library:
     """Return the library whose inputs count as measured with noise, where what a fit leaves may show it."""
-    if library.as_read is not None or not is_significant(fit) or not may_matter(library, fit):
+    if library.as_read is not None or not pooled_noise(library.data.records) or not is_significant(fit):
+        return library
+    if not may_matter(library, fit):
         return library
     with_noise = with_measured_inputs(library, fit)
     if not matters(with_noise, fit):

@@ -442,8 +442,8 @@ def finest(*calibrations: Sequence[Calibration]) -> tuple[Calibration, ...]:
     return tuple(max(each, key=lambda one: one.schedule.substeps) for each in zip(*calibrations, strict=True))
 
 
-def one(run: Simulation, i: int) -> Simulation:
-    """Return a simulation of one candidate."""
+def alone(run: Simulation, i: int) -> Simulation:
+    """Return a simulation of one candidate of several."""
     return replace(run, outputs=run.outputs[:, i : i + 1], failed=run.failed[i : i + 1])
 
 
@@ -476,15 +476,16 @@ def quickly_calibrated(
         if good:
             break
     schedule = Schedule(n, weights=switch_weights(spread, runs[n]))
-    sound = np.array([judged(one(runs[n], i), one(runs[2 * n], i))[2] for i in range(len(spread))])
-    if n >= FEWEST_SPARED and sound.any():
+    is_fine = n >= FEWEST_SPARED
+    sound = np.array([is_fine and judged(alone(runs[n], i), alone(runs[2 * n], i))[2] for i in range(len(spread))])
+    if sound.any():
         # Where steps are fine for the sake of a few samples (friction as it changes its sign), only these need be cut,
-        # and as finely as all would have to be. What the finest steps do not follow judges none.
-        schedule = replace(schedule, refinement=max(schedule.refinement, n))
+        # and as finely as all would have to be. A candidate that the finest steps do not follow judges no schedule.
         finer = simulate(model, manoeuvre, spread[sound], Schedule(2 * n), states=True)
         ranges = np.array([np.max(np.ptp(state, axis=-1)) for state in finer.states.values()])
         for share in SHARES_OF_ERROR:
-            tried = replace(schedule, rough=np.where(ranges > 0.0, share * ranges, np.inf))
+            rough = np.where(ranges > 0.0, share * ranges, np.inf)
+            tried = replace(schedule, rough=rough, refinement=max(schedule.refinement, n))
             run = simulate(model, manoeuvre, spread[sound], tried)
             judgement = judged(run, finer)
             if judgement[2] and run.n_steps < n:

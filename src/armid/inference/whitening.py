@@ -17,7 +17,7 @@ from armid.estimation.input_noise import SMALLEST_SEEN, answers
 from armid.estimation.least_squares import Estimates, LeastSquaresProblem
 from armid.estimation.noise_model import MISFIT, NoiseModel, noise_levels, sensor_of
 from armid.model import Array, Plant
-from armid.problem.problem import Replay, by_record, signals_of
+from armid.problem.problem import Replay, by_record, samples_of, signals_of
 from armid.problem.starts import answers_to_start
 from armid.record import Record
 from armid.record.sensor import FEWEST_REST_SAMPLES, InputNoise, correlation_sum, new_share, runs
@@ -234,12 +234,6 @@ def with_answers(
             squares = np.concatenate([np.sum(piece[j] ** 2, axis=1) for piece in pieces])
             levels[r] = replace(levels[r], moved=float(np.sqrt(np.mean(squares))))
     return replace(data, levels=tuple(levels[r] for r in replays), blocks=tuple(blocks.values()))
-
-
-def samples_of(starts: Sequence[int], lengths: Sequence[Sequence[int]], piece: int) -> NDArray[np.int64]:
-    """Return the samples of a piece among all, signal by signal; starts: of the signals. lengths: of their pieces."""
-    begins = [start + sum(n[:piece]) for start, n in zip(starts, lengths, strict=True)]
-    return np.concatenate([np.arange(a, a + n[piece]) for a, n in zip(begins, lengths, strict=True)])
 
 
 def with_standstills(data: WhitenedData) -> WhitenedData:

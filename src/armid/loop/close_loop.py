@@ -400,18 +400,14 @@ def known_together(fit: Fit, library: Library) -> tuple[str, ...]:
 
 
 def beyond_records(inference: Inference) -> tuple[str, ...]:
-    """Return in words which listed effects no such record tells from other values of the parameters."""
-    model, exploration = inference.in_force, inference.exploration
-    fit, waiting = exploration.fits[model], inference.probabilities["effects"].keys() - {h.name for h in model}
-    texts = []
-    for key in exploration.library.joinable(fit.active):
-        if key.public in waiting:
-            waiting = waiting - {key.public}
-            names = done_together(fit, key, exploration.library)
-            if names:
-                texts.append(f"no record tells {key.public} from other values of {listed(names)}: the intervals hold "
-                             "both; leave it out (without) where you know that there is none")  # fmt: skip
-    return tuple(texts)
+    """Return in words which listed effects no record can separate from other values of the parameters."""
+    library, fit = inference.exploration.library, inference.exploration.fits[inference.in_force]
+    first_forms = {key.public: key for key in reversed(library.joinable(fit.active))}
+    likely = [first_forms[name] for name in inference.probabilities["effects"] if name in first_forms]
+    together = {key.public: done_together(fit, key, library) for key in likely}
+    return tuple(f"no record can separate {name} from other values of {listed(names)}: the intervals hold both; if "
+                 f"{name} does not act on your machine, leave it out (without)"
+                 for name, names in together.items() if names)  # fmt: skip
 
 
 def slope(fit: Fit, records: WhiteRecords, name: str, size: float) -> Array:

@@ -266,16 +266,16 @@ def estimates(
             continue
         one = known[name]
         low, high = min(one.low, value), max(one.high, value)
-        seen = [(cause, share) for cause, share in one.causes[:MOST_CAUSES] if round(share, 2)]
-        causes = tuple(f"{cause if ' ' in cause or cause == 'noise' else f'whether {cause} acts'}, {share:.0%}"
-                       for cause, share in seen)  # fmt: skip
+        seen = [(cause if " " in cause or cause == "noise" else f"whether {cause} acts", share)
+                for cause, share in one.causes[:MOST_CAUSES] if round(share, 2)]  # fmt: skip
+        causes = tuple(f"{cause}, {share:.0%}" for cause, share in seen)
         doubts = [REMAINS] if discrepancy and (model != inference.in_force or is_unknown) else []
         if owner is not None and inference.posterior.probability("effect", owner.public) < CLAIMED:
             doubts.append(f"{owner.public} is not certain")
         if held[space.free_names.index(name)]:
             doubts.append(SEARCHED if owner is not None and name in library.fixed_shapes(owner) else HELD)
         if not max(value - low, high - value) <= within * abs(value):
-            why = f" (mostly: {causes[0].rpartition(', ')[0]})" if seen and seen[0][1] > 0.5 else ""
+            why = f" (mostly: {seen[0][0]})" if seen and seen[0][1] > 0.5 else ""
             doubts.append(f"its interval reaches more than {within:.0%} away from the value{why}")
         ends, of_noise = shown_ends(low, high), shown_ends(one.noise_low, one.noise_high)
         estimates.append(Estimate(public, value, unit, *ends, tuple(doubts), *of_noise, causes=causes))

@@ -160,6 +160,12 @@ def by_record(replays: Sequence[Replay]) -> dict[ReadyRecord, list[Replay]]:
     return groups
 
 
+def samples_of(starts: Sequence[int], lengths: Sequence[Sequence[int]], piece: int) -> NDArray[np.int64]:
+    """Return the samples of a piece among all, signal by signal; starts: of the signals. lengths: of their pieces."""
+    begins = [start + sum(n[:piece]) for start, n in zip(starts, lengths, strict=True)]
+    return np.concatenate([np.arange(a, a + n[piece]) for a, n in zip(begins, lengths, strict=True)])
+
+
 def by_output(replays: Sequence[Replay], values: Sequence[T]) -> dict[int, list[T]]:
     """Return the place of each output that is recorded, in order, with the values of its replays."""
     pairs = list(zip(replays, values, strict=True))

@@ -133,8 +133,8 @@ def space_of(
             space = space.with_fixed(name, override.fixed)
     for name in (*(bounds or {}), *(fixed or {})):
         if name in model.constants and name not in model.parameters:
-            raise ModelError(f"'{name}' is a constant of {model.plant.name}, no parameter: it is expected under "
-                             "[constants] of the campaign")  # fmt: skip
+            raise ModelError(f"'{name}' is a constant of {model.plant.name} and not a parameter: its value is "
+                             "expected under [constants] of the campaign")  # fmt: skip
     for name, (low, high) in (bounds or {}).items():
         if name in (fixed or {}):
             raise ModelError(f"parameter '{name}' is given both bounds and a fixed value: one of them is expected")

@@ -3,7 +3,7 @@
 import os.path
 import re
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -165,14 +165,10 @@ def read_campaign(
     folder = f"{above if above.isprintable() else quoted(above)}/" if above else ""
     where = f"{folder}{toml.name}"
 
-    given = load_toml(toml, where)
-    entries = given.get("records", [])
-    named = {str(one.get("file")) for one in (entries if isinstance(entries, list) else []) if isinstance(one, Mapping)}
-
-    def source(file: str, at: str) -> Callable[[float | None], CsvTable]:
+    def source(file: str, at: str, named: Collection[str]) -> Callable[[float | None], CsvTable]:
         return partial(read_table, record_path(toml.parent, file, at, named), f"{folder}{file}")
 
-    return campaign_of(given, source, toml.parent, where, plants, effects)
+    return campaign_of(load_toml(toml, where), source, toml.parent, where, plants, effects)
 
 
 @caused_by(DataError)
@@ -183,7 +179,7 @@ def campaign_of_tables(
     files = {f"{name}.csv": table for name, table in tables.items()}
     records = [{"role": "train", **as_toml(dict(table.attrs)), "file": file} for file, table in files.items()]
     sheet = {"name": "tables", "plant": plant, "records": records}
-    return campaign_of(sheet, lambda file, _: partial(table_of, files[file], file), Path("tables"), "tables", plants,
+    return campaign_of(sheet, lambda file, *_: partial(table_of, files[file], file), Path("tables"), "tables", plants,
                        effects)  # fmt: skip
 
 
@@ -208,12 +204,13 @@ def refuse_effects(texts: Sequence[str], known: Mapping[str, Effect], where: str
 
 
 def campaign_of(
-    given: Mapping[str, Any], source: Callable[[str, str], Callable[[float | None], CsvTable]], folder: Path,
-    where: str, plants: Mapping[str, Plant] | None, effects: Mapping[str, Effect] | None,
+    given: Mapping[str, Any], source: Callable[[str, str, Collection[str]], Callable[[float | None], CsvTable]],
+    folder: Path, where: str, plants: Mapping[str, Plant] | None, effects: Mapping[str, Effect] | None,
 ) -> Campaign:  # fmt: skip
     """Return a campaign; given: what campaign.toml holds. where: how messages name that.
 
-    source: file and how messages name its entry -> what reads its table, with the counts of a turn.
+    source: file, how messages name its entry, the files of all entries -> what reads its table, with the counts of a
+    turn.
     """
     sheet, plants = validated(CampaignSheet, given, where), PLANTS if plants is None else plants
     if sheet.plant not in plants:
@@ -225,7 +222,8 @@ def campaign_of(
     sheet = with_known_constants(sheet, known, declared, where)
     entries = record_entries(sheet.records, [key.key for key in declared.keys], where)
     places = [f"{where}, record {quoted(entry.file)}" for entry in entries]
-    sources = [source(entry.file, at) for entry, at in zip(entries, places, strict=True)]
+    named = {entry.file for entry in entries}
+    sources = [source(entry.file, at, named) for entry, at in zip(entries, places, strict=True)]
     records: list[Record] = []
     with warned_once():
         for read, entry, at in zip(sources, entries, places, strict=True):

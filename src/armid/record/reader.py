@@ -435,7 +435,7 @@ def campaign_path(path: str | Path) -> Path:
 
 
 def record_path(folder: Path, file: str, where: str, named: Collection[str] = ()) -> Path:
-    """Return where a record is; named: the files of all records, which are none that may be meant instead."""
+    """Return where a record is; named: the files of all records, which a message does not propose in its place."""
     pure = PurePosixPath(file.replace("\\", "/"))
     if pure.is_absolute() or PureWindowsPath(file).drive or ".." in pure.parts:
         raise ArmidError(f"{where}: file {quoted(file)} leads out of the campaign's folder, a file inside is expected")

@@ -1,6 +1,6 @@
 """One file with its manoeuvre: Record, the Signals that it measured, and the Pieces in which it is simulated."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -62,6 +62,12 @@ class StartCorrection:
         for place, slopes in zip(self.places, self.slopes.swapaxes(0, 1), strict=True):
             signals[place] += np.einsum("cs,sn->cn", lacking, slopes[:, : outputs.shape[2]])
         return signals
+
+    def left_of(self, changes: Sequence[Array]) -> list[Array]:
+        """Return what the start leaves of changes of the seen signals; of each output and in return (n_seen, n)."""
+        moved = -self.gain @ np.concatenate(changes)
+        pairs = zip(changes, self.slopes.swapaxes(0, 1), self.samples, strict=True)
+        return [change + slopes[:, samples].T @ moved for change, slopes, samples in pairs]
 
 
 @dataclass(frozen=True, eq=False)
