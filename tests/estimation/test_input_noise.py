@@ -168,6 +168,9 @@ def test_an_interval_holds_what_noise_of_an_input_does_where_fitted_starts_and_t
         off = [fit.parameters["inertia"].value - INERTIA, fit.parameters["damping"].value - DAMPING]
         inside += [p.low <= true <= p.high and p.interval_holds for p, true in
                    ((fit.parameters["inertia"], INERTIA), (fit.parameters["damping"], DAMPING))]  # fmt: skip
+        # what the ellipses of pairs are drawn from
+        assert fit.uncertainty.half_width[0] == pytest.approx(fit.parameters["inertia"].high - fit.candidate[0])
+        assert np.all(fit.uncertainty.deviation >= fit.information.deviation)
         alone += list(np.abs(off) <= fit.information.half_width)
         text = " ".join(ranked(fit))
         assert ("Noise of the inputs moves" in text) == (measured is noisy)

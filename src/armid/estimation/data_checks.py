@@ -231,7 +231,7 @@ class DataTrial:
 def started(trial: DataTrial, train: Sequence[Record], worst: float) -> tuple[list[Record], Array] | None:
     """Return records with fitted starts, and the estimate from these, if that explains the records; else None.
 
-    The first samples of a noisy position tell a speed so poorly that a sound record of little friction drifts away.
+    The first samples of a noisy position give a poor speed, so that a sound record of little friction drifts away.
     worst: error of the declared model on a record as it was read.
     """
     problem = trial.problem(train)

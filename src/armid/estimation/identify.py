@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from armid.errors import ArmidError
 from armid.estimation.bootstrap import Refined, Scatter, bootstrap, without
 from armid.estimation.corrections import DataIssue
-from armid.estimation.information import NORMAL_95, Information, collinear, deviation_by_inputs, information_at
+from armid.estimation.information import Information, collinear, covariance_by_inputs, information_at
 from armid.estimation.input_noise import moved_by_inputs
 from armid.estimation.least_squares import held_by_bound, refine, with_fitted_starts
 from armid.estimation.noise_model import MISFIT, Level, NoiseModel, known_level, level_of
@@ -166,7 +166,7 @@ class Identification(Result):
         if not space.free[i]:
             return ParameterEstimate(value, space.units[i])
         k, doubt, scatter = self.information.names.index(name), self.interval_doubts[name], self.scatter
-        half = NORMAL_95 * float(np.hypot(self.information.deviation[k], self.deviation_by_inputs[k]))
+        half = self.uncertainty.half_width[k]
         low, high = (value - half, value + half) if scatter is None else (scatter.low[k], scatter.high[k])
         known = bool(np.isfinite([low, high]).all())
         return ParameterEstimate(
@@ -197,27 +197,36 @@ class Identification(Result):
             return dict.fromkeys(information.names, "what the model leaves is more than the noise")
         doubts = dict.fromkeys(information.names, "")
         if self.scatter is not None:
-            doubts |= dict.fromkeys(self.widened_by_inputs, "noise of the inputs moves it by more than that of sensors")
+            doubts |= dict.fromkeys(
+                self.widened_by_inputs, "noise of the inputs moves it by more than noise of sensors"
+            )
             shares = zip(information.names, self.scatter.bias / information.deviation, strict=True)
             doubts |= {name: f"its estimate is biased by {share:.2g} standard deviations"
                        for name, share in shares if abs(share) > BIASED}  # fmt: skip
         doubts |= dict.fromkeys(held, "it rests at its bound")
-        for pair in (pair[:2] for pair in collinear(information)):
+        for pair in (pair[:2] for pair in collinear(self.uncertainty)):
             for name, other in (pair, pair[::-1]):
                 if other in held and not doubts[name]:
                     doubts[name] = f"it is correlated with {other}, which rests at its bound"
         return doubts
 
     @cached_property
-    def deviation_by_inputs(self) -> Array:
-        """How far noise of the inputs moves the estimate, standard deviations, SI, (n_free,)."""
+    def by_inputs(self) -> Array:
+        """Covariance of the estimate by noise of the inputs, SI, (n_free, n_free)."""
         levels = tuple(known_level(r) for r in self.train_replays)
-        return deviation_by_inputs(self.train_replays, self.space, self.candidate[self.space.free], levels)
+        return covariance_by_inputs(self.train_replays, self.space, self.candidate[self.space.free], levels)
+
+    @cached_property
+    def uncertainty(self) -> Information:
+        """The information with noise of the inputs; a bootstrap draws noise of the sensors alone."""
+        if self.scatter is not None or not self.by_inputs.any():
+            return self.information
+        return self.information.widened(self.by_inputs)
 
     @property
     def widened_by_inputs(self) -> tuple[str, ...]:
         """Free parameters that noise of the inputs moves by more than noise of the sensors does."""
-        more = self.deviation_by_inputs > self.information.deviation
+        more = np.sqrt(np.diag(self.by_inputs)) > self.information.deviation
         return tuple(name for name, wider in zip(self.information.names, more, strict=True) if wider)
 
     @property

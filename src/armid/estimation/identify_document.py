@@ -192,7 +192,7 @@ def parts_of(identification: Identification) -> Parts:
 
 def result_of(identification: Identification) -> dict[str, Any]:
     """Return everything of an identification that JSON can hold, SI throughout; what is not known is null."""
-    names, correlation = identification.information.names, identification.information.correlation
+    names, correlation = identification.uncertainty.names, identification.uncertainty.correlation
     roles = {r.record.file: r.record.role for r in identification.replays}
     by_file = errors_by_file(identification.replays, identification.candidate)
     noises: dict[str, dict[str, Any]] = {}
@@ -258,7 +258,7 @@ def ranked(identification: Identification) -> list[str]:
                      "most of what these intervals are wide.")  # fmt: skip
     deviations = zip(information.names, information.deviation, strict=True)
     texts += [f"{name} is not determined by these records." for name, d in deviations if not np.isfinite(d)]
-    pairs = collinear(information)
+    pairs = collinear(identification.uncertainty)
     if pairs:
         text = ", ".join(f"{a} and {b} {r:+.3f}" for a, b, r in pairs)
         texts.append(f"Hardly to be told apart on these records (correlation): {text}; a change of one is made up for "
@@ -373,7 +373,7 @@ def figures_of(identification: Identification) -> dict[str, Callable[[], Any]]:
     made |= {"convergence": lambda: convergence_figure(identification)} if len(identification.trace[0]) else {}
     own = identification.candidate[identification.space.free], identification.campaign.truth
     draws = None if identification.scatter is None else identification.scatter.draws
-    return made | pairs_of(identification.campaign.name, identification.space, identification.information, *own, draws)
+    return made | pairs_of(identification.campaign.name, identification.space, identification.uncertainty, *own, draws)
 
 
 def fit_figure(identification: Identification) -> Any:

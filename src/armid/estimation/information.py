@@ -45,6 +45,14 @@ class Information:
         """Half of the 95 % interval, SI."""
         return NORMAL_95 * self.deviation
 
+    def widened(self, covariance: Array) -> "Information":
+        """Return the information with another cause of scatter; covariance: of the estimate by it, SI, squared."""
+        total = np.sqrt(self.deviation**2 + np.diag(covariance))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            mixed = self.correlation * np.outer(self.deviation, self.deviation) + covariance
+            correlation = mixed / np.outer(total, total)
+        return replace(self, deviation=total, correlation=np.where(np.isfinite(correlation), correlation, np.nan))
+
 
 def information_at(
     replays: tuple[Replay, ...], space: Space, x: Array, levels: tuple[Level, ...] | None = None,
@@ -178,21 +186,21 @@ def start_changes(records: LeastSquaresProblem, z: Array, bent: bool = False) ->
                     yield change_of_piece(outputs, index, 0.5 * (above + below) - same)
 
 
-def deviation_by_inputs(replays: tuple[Replay, ...], space: Space, x: Array, levels: tuple[Level, ...]) -> Array:
-    """Return how far noise of the inputs moves an estimate, standard deviations, SI, (n_free,).
+def covariance_by_inputs(replays: tuple[Replay, ...], space: Space, x: Array, levels: tuple[Level, ...]) -> Array:
+    """Return the covariance of an estimate by noise of the inputs, SI, (n_free, n_free).
 
     To first order, with the starts that are fitted. 0 where all inputs are commands, and where what is left is too
     small to hold such noise: the inputs are then commands.
     """
     noise = pooled_noise([ready.record for ready in by_record(replays)])
     if not noise or any(level.rms == 0.0 for level in levels):
-        return np.zeros(len(x))
+        return np.zeros((len(x), len(x)))
     records = WeightedRecords(replays, space, tuple(1.0 / level.rms for level in levels))
     z = records.shares(x)
     residual, jacobian = records.residual_and_slopes(z)
     covariance = inverse(jacobian.T @ jacobian)
     covariance = np.where(np.isfinite(covariance), covariance, 0.0)
-    moved, left, lengths = np.zeros(len(x)), 0.0, [r.record.n_samples for r in replays]
+    moved, left, lengths = np.zeros((len(x), len(x))), 0.0, [r.record.n_samples for r in replays]
     begins = dict(zip(replays, np.cumsum(lengths) - lengths, strict=True))
     weights = dict(zip(replays, records.weights, strict=True))
     for ready, outputs in by_record(replays).items():
@@ -204,10 +212,10 @@ def deviation_by_inputs(replays: tuple[Replay, ...], space: Space, x: Array, lev
             changes = np.vstack([weights[r] * each for r, each in zip(outputs, seen, strict=True)])
             slopes = jacobian[rows].T @ changes
             shifts = covariance @ slopes
-            moved += np.sum(shifts**2, axis=1)
+            moved += shifts @ shifts.T
             left += float(np.sum(changes**2) - np.sum(slopes * shifts)) / len(residual)
     shows = np.mean(residual**2) > 1.0 + LEFT_OF_MOVED**2 * left
-    return np.sqrt(moved) * records.span if shows or left < 1.0 else np.zeros(len(x))
+    return moved * np.outer(records.span, records.span) if shows or left < 1.0 else np.zeros((len(x), len(x)))
 
 
 def inverse(matrix: Array) -> Array:

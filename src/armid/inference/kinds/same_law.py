@@ -7,8 +7,8 @@ parameter changes all rates and outputs as the effect does. Then also while some
 wrong gain of the drive looks like another mass only until something else acts. An effect in exactly the form of a
 parameter is not tried. One in another form (a sign that is smoothed otherwise) is improbable.
 
-What all free parameters do together (a gain of the drive, where all that it moves is to be identified) no record tells
-from it: records give only ratios of such strengths. It is tried, as the intervals have to hold both.
+No record can separate some effects from a change of all free parameters together. A gain of the drive is one of them
+if all that it moves is free. Such an effect is tried, since the intervals have to hold both.
 """
 
 from collections.abc import Collection, Iterable, Mapping
