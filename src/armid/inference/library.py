@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armid.engine import STANDARD, Calibration, Schedule, Simulation, accuracy_against, probes, simulate
+from armid.engine.simulate import stages_as_stable_as
 from armid.engine.calibrate import ALLOWED, MARGIN_OF_STEPS, difference, switch_weights
 from armid.estimation.least_squares import side_by_side
 from armid.inference.candidates import (
@@ -483,15 +484,15 @@ def quickly_calibrated(
         # and as finely as all would have to be. A candidate that the finest steps do not follow judges no schedule.
         finer = simulate(model, manoeuvre, spread[sound], Schedule(2 * n), states=True)
         ranges = np.array([np.max(np.ptp(state, axis=-1)) for state in finer.states.values()])
-        for share in SHARES_OF_ERROR:
+        plain, fewest = schedule, float(n)
+        for stages, share in product((0, stages_as_stable_as(n)), SHARES_OF_ERROR):
             rough = np.where(ranges > 0.0, share * ranges, np.inf)
-            tried = replace(schedule, rough=rough, refinement=max(schedule.refinement, n))
+            tried = replace(plain, rough=rough, refinement=max(plain.refinement, n), stages=stages)
             run = simulate(model, manoeuvre, spread[sound], tried)
             judgement = judged(run, finer)
-            if judgement[2] and run.n_steps < n:
-                schedule = tried
+            if judgement[2] and run.n_steps < fewest:
+                schedule, fewest = tried, run.n_steps
                 error, is_hidden = judgement[:2] if good else (error, is_hidden)
-                break
     return Calibration(schedule, error, is_hidden or bool(error <= allowed))
 
 
