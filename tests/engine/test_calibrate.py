@@ -1,11 +1,14 @@
 """How finely time is cut: as finely as the error asks for."""
 
+from dataclasses import replace
 from importlib import import_module
 
 import numpy as np
+import pytest
 
 from arm_cases import box_of
 from armid.engine import Schedule, calibrate, probes, simulate
+from armid.engine.simulate import chebyshev, stages_as_stable_as
 from armid.inference.library import quickly_calibrated
 from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
 
@@ -119,3 +122,57 @@ def test_steps_are_spared_where_more_than_eight_are_asked_for_and_next_to_what_n
         run, finest = (simulate(RUBBED, manoeuvre, sharp, s) for s in (found.schedule, Schedule(128)))
         assert run.n_steps < 0.6 * found.schedule.substeps
         assert np.abs(run.output - finest.output).max() < 5e-6 * RUBBED.plant.sizes[0]
+
+
+@pytest.mark.parametrize("n", [2, 3, 6, 12])
+def test_stable_steps_are_of_second_order_and_bear_fast_decays(n):
+    rows = chebyshev(n)
+
+    def step(rate, y, h):
+        slope = rate(0.0, y)
+        older, newer = y, y + h * rows[0, 2] * slope
+        for mu, nu, own, first, c in rows[1:n]:
+            rest = h * (own * rate(c * h, newer) + first * slope)
+            older, newer = newer, (1.0 - mu - nu) * y + mu * newer + nu * older + rest
+        return newer
+
+    def missed(h):
+        halves = step(lambda t, y: np.cos(t + h / 2) - y**2, step(lambda t, y: np.cos(t) - y**2, 1.0, h / 2), h / 2)
+        return abs(step(lambda t, y: np.cos(t) - y**2, 1.0, h) - halves)
+
+    assert missed(0.05) / missed(0.025) == pytest.approx(8.0, rel=0.1)
+    decays = np.linspace(0.05, 0.65, 1000) * (n**2 - 1)
+    assert np.abs(step(lambda t, y: -decays * y, np.ones(1000), 1.0)).max() < 1.0
+    assert np.all(rows[1:, 4] > rows[:-1, 4])
+    assert [stages_as_stable_as(n) for n in (8, 32)] == [6, 12]
+
+
+@pytest.mark.parametrize(
+    ("more", "share"),
+    [((), 1e-4), (("drive_delay",), 1e-4), (("output_delay",), 1e-4), (("dead_zone",), 1e-4), (("backlash",), 1e-6)],
+)
+def test_friction_that_holds_takes_few_steps(more, share):
+    """As accurate as with fine steps alone, in less than half of them; the last swings, and has kinks in stable steps.
+
+    Where motion swings, stable steps are as accurate as they are asked to be, and spare nothing.
+    """
+    plant = PLANTS["flexible_link" if more == ("backlash",) else "driven_axis"]
+    model = Model(plant, tuple(EFFECTS[name] for name in ("coulomb", *more)))
+    middle = {"mass": 0.4, "coulomb.level": 0.9, "coulomb.width": 1e-3, "drive_delay.delay": 0.023,
+              "output_delay.delay": 0.017, "hub_inertia": 0.4, "tip_inertia": 0.1, "stiffness": 4.0,
+              "hub_damping": 0.2, "link_damping": 0.02}  # fmt: skip
+    values = np.array([middle.get(n, 0.5 * (p.low + p.high)) for n, p in model.parameters.items()])
+    candidates = values * np.random.default_rng(3).uniform(0.9, 1.1, (16, len(values)))
+    times = 0.01 * np.arange(600)
+    manoeuvre = Manoeuvre(0.01, 600, {}, {"u": 1.2 * np.sin(1.3 * times) + 0.4 * np.sin(7.1 * times)})
+    finest = simulate(model, manoeuvre, candidates, Schedule(128), states=True)
+    ranges = np.array([np.ptp(state) for state in finest.states.values()])
+    fine = Schedule(16, refinement=16, rough=share * ranges)
+    stable = replace(fine, stages=stages_as_stable_as(16))
+    runs = [simulate(model, manoeuvre, candidates, s) for s in (Schedule(16), fine, stable)]
+    even, finely, stably = (np.abs(run.outputs - finest.outputs).max() for run in runs)
+    assert stably < 2.0 * max(finely, even)
+    assert stably < 2e-4 * np.ptp(finest.outputs)
+    assert more == ("backlash",) or runs[2].n_steps < 0.5 * runs[1].n_steps
+    alone = [simulate(model, manoeuvre, c, stable).outputs[:, 0] for c in candidates]
+    assert np.array_equal(np.swapaxes(alone, 0, 1), simulate(model, manoeuvre, candidates, stable, threads=2).outputs)

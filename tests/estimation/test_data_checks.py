@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from armid.contract.check import check_campaign
+from armid.contract.check import check_campaign, far_from_typical
 from armid.engine.simulate import Prepared
 from armid.errors import ArmidError
 from armid.estimation.corrections import Correction, moved
@@ -309,6 +309,22 @@ def test_what_the_declared_model_misses_cannot_be_judged(campaign):
     (point,) = [p for p in check_campaign(read, dict(EFFECTS)) if p.name.startswith("plausible")]
     assert (point.name, point.passed, point.sentence) == ("plausible (unjudged)", True, sentence)
     assert point.unclear
+
+
+def test_an_input_in_another_unit_than_is_typical_is_asked_about(campaign):
+    """Of the records that are a hundred times below or above what the plant is typically driven by."""
+    read = read_campaign(campaign("axis"))
+    (driven,) = read.plant.inputs
+    sizes = {r.file: max(np.max(np.abs(p.manoeuvre.inputs[driven.name])) for p in r.pieces) for r in read.records}
+
+    def asked(typical):
+        return list(far_from_typical(read, replace(read.plant, inputs=(replace(driven, typical=typical),))))
+
+    assert asked(None) == asked((-3.0 * max(sizes.values()), 0.0)) == []
+    for typical in ((-500.0 * max(sizes.values()), 0.0), (0.0, min(sizes.values()) / 500.0)):
+        (point,) = asked(typical)
+        assert (point.name, point.unclear) == (f"input {driven.name}", True)
+        assert point.sentence.startswith(", ".join(sizes))
 
 
 def test_check_and_identify_say_it(campaign, run):

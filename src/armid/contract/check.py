@@ -23,6 +23,8 @@ from armid.problem.space import space_of
 from armid.record import Campaign, Record
 
 CHECK_INTERVAL, NOISE_OF_TRIAL = 1e-3, 0.01
+# So many times smaller or larger than is typical an input is probably in another unit.
+FAR = 100.0
 
 
 def check_thing(kind: str, name: str, thing: Any, plants: Mapping[str, Plant] = PLANTS) -> Iterator[ContractPoint]:
@@ -77,9 +79,23 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[C
             measured = f"{np.max(np.abs(replay.measured)):.3g} {replay.record.unit}"
             text = f"simulated {size} with parameters in the middle of their ranges, measured up to {measured}"
             yield ContractPoint(f"moves in {replay.name}", is_finite, text)
+        yield from far_from_typical(campaign, model.plant)
         yield from plausible(data_issues(campaign, model, space))
     except ArmidError as error:
         yield ContractPoint("model", False, str(error))
+
+
+def far_from_typical(campaign: Campaign, plant: Plant) -> Iterator[ContractPoint]:
+    """Ask about the unit of inputs that are a hundred times smaller or larger than what is typical of a plant."""
+    for of in (i for i in plant.inputs if i.typical is not None):
+        low, high = of.typical or (0.0, 0.0)
+        largest = {r.file: max(float(np.max(np.abs(p.manoeuvre.inputs[of.name]))) for p in r.pieces)
+                   for r in campaign.records}  # fmt: skip
+        files = [f for f, x in largest.items() if x > 0.0 and not 1 / FAR < x / max(-low, high) < FAR]
+        if files:
+            text = f"{', '.join(files)}: up to {max(largest[f] for f in files):.3g} {of.unit}, while {low:g} to "
+            text += f"{high:g} {of.unit} is typical of plant '{plant.name}': look at the unit of the column"
+            yield ContractPoint(f"input {of.name}", True, text, unclear=True)
 
 
 def ready_at(candidate: Array, record: Record, model: Model) -> ReadyRecord:

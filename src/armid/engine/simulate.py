@@ -131,9 +131,8 @@ def prepare(model: Model, manoeuvre: Manoeuvre, schedule: Schedule = Schedule(),
     constants = np.array(model.constant_values(manoeuvre.constants))
     settings = (
         input_values(model, manoeuvre), float(manoeuvre.interval), manoeuvre.n_samples, schedule.least,
-        schedule.refinement, chebyshev(schedule.stages), float(schedule.fresh_samples), spans, np.array([hold == "zero" for hold in holds]),
-        float(manoeuvre.start_time),
-        DIVERGED * np.array(model.plant.sizes),
+        schedule.refinement, chebyshev(schedule.stages), float(schedule.fresh_samples), spans,
+        np.array([hold == "zero" for hold in holds]), float(manoeuvre.start_time), DIVERGED * np.array(model.plant.sizes),
         schedule.rough is not None,
         np.zeros(len(model.states)) if schedule.rough is None else 1.0 / schedule.rough,
         manoeuvre.n_before,

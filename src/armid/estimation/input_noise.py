@@ -17,7 +17,7 @@ from scipy.ndimage import uniform_filter1d
 from armid.model import Array
 from armid.problem.problem import ReadyRecord, Replay, by_record
 from armid.record import Piece, Record
-from armid.record.sensor import InputNoise, Mask, lengths_of_rest
+from armid.record.sensor import InputNoise, Mask, length_of_rest
 
 # Drawn errors, and their seed.
 DRAWN_ERRORS, DRAWN_ANSWERS, SEED_OF_ERRORS = 16, 8, 1
@@ -111,14 +111,12 @@ def smoothed_bytes(column: bytes, noise: InputNoise, still: bytes) -> Smoothed:
 def at_rest(record: Record, piece: Piece, values: Array) -> Mask:
     """Return where an input and the machine stand still, at the begin and the end of a piece, (n_samples,).
 
-    There the input is constant: a machine that noise of the drive moved would not stand still. Of growing lengths the
-    last but one counts, as the drive may begin before this shows.
+    There the input is constant: a machine that noise of the drive moved would not stand still.
     """
     outputs = [(piece.of(s.measured), s.is_speed) for s in record.signals]
     still = np.zeros(values.size, dtype=np.bool_)
     for way in (slice(None), slice(None, None, -1)):
-        lengths = [*lengths_of_rest([values[way]], [(y[way], is_speed) for y, is_speed in outputs])]
-        still[way][: lengths[-2] if len(lengths) > 1 else 0] = True
+        still[way][: length_of_rest([values[way]], [(y[way], is_speed) for y, is_speed in outputs])] = True
     return still
 
 

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armid.engine import STANDARD, Calibration, Schedule, Simulation, accuracy_against, probes, simulate
-from armid.engine.simulate import stages_as_stable_as
 from armid.engine.calibrate import ALLOWED, MARGIN_OF_STEPS, difference, switch_weights
+from armid.engine.simulate import stages_as_stable_as
 from armid.estimation.least_squares import side_by_side
 from armid.inference.candidates import (
     ERROR_OF,
@@ -481,7 +481,8 @@ def quickly_calibrated(
     sound = np.array([is_fine and judged(alone(runs[n], i), alone(runs[2 * n], i))[2] for i in range(len(spread))])
     if sound.any():
         # Where steps are fine for the sake of a few samples (friction as it changes its sign), only these need be cut,
-        # and as finely as all would have to be. A candidate that the finest steps do not follow judges no schedule.
+        # and as finely as all would have to be; where many samples are rough for the sake of stability (friction that
+        # holds), one stable step serves. A candidate that the finest steps do not follow judges no schedule.
         finer = simulate(model, manoeuvre, spread[sound], Schedule(2 * n), states=True)
         ranges = np.array([np.max(np.ptp(state, axis=-1)) for state in finer.states.values()])
         plain, fewest = schedule, float(n)

@@ -34,7 +34,7 @@ from armid.record.sensor import (
     after_sudden,
     difference_rms,
     in_runs,
-    lengths_of_rest,
+    length_of_rest,
     noise_of,
     noise_of_input,
     renewed,
@@ -184,7 +184,7 @@ def rest_and_noise(new: New, inputs: Sequence[Array], is_speed: bool) -> tuple[A
     if new.rest.size >= FEWEST_REST_SAMPLES or not inputs:
         return new.rest, noise
     changes = sum((np.append(0, np.cumsum(np.diff(x) != 0.0)) for x in inputs), np.zeros(inputs[0].size))
-    n_still = max(lengths_of_rest(inputs), default=0)
+    n_still = length_of_rest(inputs)
     still = ~new.since(changes)[new.n_rest :] | (new.at[new.n_rest :] < n_still)
     rest = rest_between(new.motion, still, is_speed)
     # equal values tell the step of the sensor alone, which the motion tells as well

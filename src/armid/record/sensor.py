@@ -276,6 +276,16 @@ def lengths_of_rest(inputs: Sequence[Array], outputs: Sequence[tuple[Array, bool
         n = ceil(LONGER_REST * n)
 
 
+def length_of_rest(inputs: Sequence[Array], outputs: Sequence[tuple[Array, bool]] = ()) -> int:
+    """Return in how many first rows inputs and outputs stand still, 0 where they move from the first on.
+
+    Of growing lengths the last but one counts, as the motion may begin before this shows. Arguments as for
+    `lengths_of_rest`.
+    """
+    lengths = [0, *lengths_of_rest(inputs, outputs)] if inputs else [0]
+    return lengths[-2] if len(lengths) > 2 else lengths[-1]
+
+
 def rest_between(values: Array, still: Mask, is_speed: bool) -> Array:
     """Return the longest rest between motions, empty without one of 50 samples.
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from armid.model import Array, Model, Plant
 from armid.record.record import Signal
-from armid.record.sensor import lengths_of_rest
+from armid.record.sensor import length_of_rest
 
 State = tuple[dict[str, float], dict[str, float]]
 # Of a record that is held out, the start comes from this share of its first samples, at most so long [s], at least so
@@ -108,7 +108,7 @@ def n_still(inputs: Sequence[Array]) -> int:
     if not inputs:
         return 0
     changed = np.flatnonzero(np.any([u != u[0] for u in inputs], axis=0))
-    return max([int(changed[0]) if changed.size else len(inputs[0]), *lengths_of_rest(inputs)])
+    return max(int(changed[0]) if changed.size else len(inputs[0]), length_of_rest(inputs))
 
 
 class VisibleOutputs:
