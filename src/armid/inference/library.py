@@ -485,15 +485,15 @@ def quickly_calibrated(
         # holds), one stable step serves. A candidate that the finest steps do not follow judges no schedule.
         finer = simulate(model, manoeuvre, spread[sound], Schedule(2 * n), states=True)
         ranges = np.array([np.max(np.ptp(state, axis=-1)) for state in finer.states.values()])
-        plain, fewest = schedule, float(n)
-        for stages, share in product((0, stages_as_stable_as(n)), SHARES_OF_ERROR):
+        for stages, share in product((stages_as_stable_as(n), 0), SHARES_OF_ERROR):
             rough = np.where(ranges > 0.0, share * ranges, np.inf)
-            tried = replace(plain, rough=rough, refinement=max(plain.refinement, n), stages=stages)
+            tried = replace(schedule, rough=rough, refinement=max(schedule.refinement, n), stages=stages)
             run = simulate(model, manoeuvre, spread[sound], tried)
             judgement = judged(run, finer)
-            if judgement[2] and run.n_steps < fewest:
-                schedule, fewest = tried, run.n_steps
+            if judgement[2] and run.n_steps < n:
+                schedule = tried
                 error, is_hidden = judgement[:2] if good else (error, is_hidden)
+                break
     return Calibration(schedule, error, is_hidden or bool(error <= allowed))
 
 
