@@ -449,7 +449,7 @@ def record_path(folder: Path, file: str, where: str, named: Collection[str] = ()
         if os.path.lexists(path):
             raise ArmidError(f"{where}: file {quoted(file)} does not exist: a folder or a dead link has that name, a "
                              "CSV file is expected")  # fmt: skip
-        hint = nearest(file, files) if files else "and no other CSV file is in that folder"
+        hint = nearest(file, files) if files else "and no CSV file of that folder is left that no record names"
         raise ArmidError(f"{where}: file {quoted(file)} does not exist, {hint}")
     real = Path(os.path.realpath(path))
     if not real.is_relative_to(os.path.realpath(folder)):

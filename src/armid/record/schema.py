@@ -372,4 +372,5 @@ def load_toml(path: Path, named: str = "") -> dict[str, Any]:
         raise ArmidError(f"{where} is nested too deeply, plain tables of TOML are expected") from error
     except ValueError as error:
         # TOMLDecodeError tells the line; numbers of too many digits come as a plain ValueError
-        raise ArmidError(f"{where} is not valid TOML: {str(error)[:200]}") from error
+        hint = ": each record begins with [[records]]" if "('records',) twice" in str(error) else ""
+        raise ArmidError(f"{where} is not valid TOML: {str(error)[:200]}{hint}") from error
