@@ -267,8 +267,12 @@ def test_friction_is_found_beside_it_and_judged_by_the_model_that_the_loop_ends_
     rms = found.outputs["angular_velocity"]["moved_by_inputs"]
     fit = identify(records)
     assert rms == pytest.approx(next(iter(moved_by_inputs(fit.train_replays, fit.candidate).values())), rel=0.1)
+    unseen = found.outputs["angular_velocity"]["moved_by_inputs_holdout"]
+    assert unseen == pytest.approx(fit.outputs["angular_velocity"]["moved_by_inputs_holdout"], rel=0.1)
+    assert unseen != pytest.approx(rms, rel=0.01)
     assert report_of(found)["probabilities"]["unknown"] < 0.05
-    assert "that of the inputs moves the model by" in error_sentence(report_of(found))
+    shown = f"that of the inputs moves the model by {np.rad2deg(unseen):.3g} deg/s"
+    assert shown in error_sentence(report_of(found))
 
 
 def computed(seed):

@@ -1,6 +1,7 @@
 """The text of the generated module: the composed equations and the loop that integrates them.
 
-Classical fourth-order Runge-Kutta on lanes of candidates, a fixed number of steps between samples. Where a guard
+Classical fourth-order Runge-Kutta on lanes of candidates, a fixed number of steps between samples; on request one
+stabilised step in place of many where motion decays faster than a step, as where friction holds. Where a guard
 changes its sign inside a step, the step is cut there: a quadratic through the guard at both ends and in the middle
 (cubic Hermite of the states) gives the instant. Only lanes with a change take the cut, so a candidate's result does
 not depend on its neighbours. The loop stands in templates/kernel.py.jinja.

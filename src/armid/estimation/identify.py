@@ -17,7 +17,7 @@ from armid.errors import ArmidError
 from armid.estimation.bootstrap import Refined, Scatter, bootstrap, without
 from armid.estimation.corrections import DataIssue
 from armid.estimation.information import Information, collinear, covariance_by_inputs, information_at
-from armid.estimation.input_noise import moved_by_inputs
+from armid.estimation.input_noise import moved_by_inputs, pooled_noise
 from armid.estimation.least_squares import held_by_bound, refine, with_fitted_starts
 from armid.estimation.noise_model import MISFIT, Level, NoiseModel, known_level, level_of
 from armid.identifiers import Identifier, run
@@ -28,6 +28,7 @@ from armid.problem.problem import (
     IdentificationProblem,
     Replay,
     by_output,
+    by_record,
     fitness_of,
     judged_by,
     output_sizes,
@@ -183,7 +184,9 @@ class Identification(Result):
     @cached_property
     def outputs(self) -> dict[str, dict[str, Any]]:
         """Output -> its unit, the noise of its records, and how far noise of their inputs moves the model."""
-        return entries_of_noise(self.replays, [known_level(r) for r in self.replays], self.candidate)
+        return entries_of_noise(
+            self.replays, [known_level(r) for r in self.replays], self.candidate, self.holdout_replays
+        )
 
     @cached_property
     def interval_doubts(self) -> dict[str, str]:
@@ -448,17 +451,20 @@ def output_errors(replays: Sequence[Replay], candidate: Array) -> Errors:
 
 
 def entries_of_noise(
-    replays: Sequence[Replay], levels: Sequence[Level | NoiseModel], candidate: Array
+    replays: Sequence[Replay], levels: Sequence[Level | NoiseModel], candidate: Array, unseen: Sequence[Replay]
 ) -> dict[str, dict[str, Any]]:  # fmt: skip
     """Return what is known of the noise of each output, for JSON.
 
-    Its unit, its noise (the mean over records) and in words what is special about it, how far noise of inputs moves it.
-    levels: of each replay.
+    Its unit, its noise (the mean over records) and in words what is special about it, how far noise of inputs moves it
+    on records that were fitted and on the unseen ones. levels: of each replay.
     """
-    outputs, moved = replays[0].model.plant.outputs, moved_by_inputs(replays, candidate)
+    outputs, fitted = replays[0].model.plant.outputs, [r for r in replays if r not in unseen]
+    noise = pooled_noise([ready.record for ready in by_record([*fitted, *unseen])])
+    moved, moved_unseen = (moved_by_inputs(some, candidate, noise) for some in (fitted, unseen))
     return {outputs[place].name: {
         "unit": outputs[place].unit, "noise_rms": float(np.mean([level.rms for level in of])),
         "moved_by_inputs": moved.get(outputs[place].name, 0.0),
+        "moved_by_inputs_holdout": moved_unseen.get(outputs[place].name, 0.0) if unseen else None,
         "noise_in_motion": next((level.remark for level in of if level.remark), ""),
     } for place, of in by_output(replays, levels).items()}  # fmt: skip
 

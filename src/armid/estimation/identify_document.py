@@ -31,6 +31,7 @@ from armid.report.document import (
     listing,
     made_section,
     may_be_inputs,
+    moved_of,
     moved_text,
     noise_text,
     others_text,
@@ -130,8 +131,8 @@ def answer(result: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, 
         out = f"{rmse_text(holdout, result['unit'])} on those held out"
     output, unit = next(iter(result["outputs"].values())), shown(0.0, result["unit"])[1]
     second = (f"Error (RMSE): {rmse_text(train, result['unit'])} {unit} on the records fitted, {out}; "
-              f"{noise_text(output['noise_rms'], output, train)}.{others_text(train, holdout)}"
-              f"{moved_text(result['outputs'], train)}")  # fmt: skip
+              f"{noise_text(output['noise_rms'], output, train, False)}.{others_text(train, holdout)}"
+              f"{moved_text(result['outputs'], train, False)}")  # fmt: skip
     held = [name for name, p in free.items() if p["bound_active"]]
     doubts = [f"Held by a bound, and not to be trusted: {', '.join(held)}."] if held else []
     doubts += [f"Not determined by these records: {', '.join(lost)}."] if lost else []
@@ -318,7 +319,7 @@ def convergence_remarks(identification: Identification) -> list[str]:
         known = identification.outputs
         missed = {n: e.rmse for n, e in unseen.outputs.items() if e.rmse > CARRIES_OVER * known[n]["noise_rms"]}
         may = missed and all(
-            may_be_inputs(known[n]["noise_rms"], known[n]["moved_by_inputs"], x) for n, x in missed.items()
+            may_be_inputs(known[n]["noise_rms"], moved_of(known[n], True), x) for n, x in missed.items()
         )
         why = ", which noise of the inputs may do" if may else ""
         texts.append(f"The fit does not carry over: its mean square is {holdout:.3g} times that of the noise on the "

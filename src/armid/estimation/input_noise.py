@@ -252,7 +252,9 @@ def with_changes(record: Record, name: str, changes: Sequence[Array]) -> Record:
     return replace(record, pieces=tuple(p.with_inputs({name: u + change[: u.size]}) for p, u, change in pieces))
 
 
-def moved_by_inputs(replays: Sequence[Replay], candidate: Array) -> dict[str, float]:
+def moved_by_inputs(
+    replays: Sequence[Replay], candidate: Array, noise: Mapping[str, InputNoise] | None = None
+) -> dict[str, float]:  # fmt: skip
     """Return how far noise of the inputs moves each output, to first order.
 
     Parameters
@@ -261,13 +263,16 @@ def moved_by_inputs(replays: Sequence[Replay], candidate: Array) -> dict[str, fl
         Of records whose inputs may be measured with noise.
     candidate : array, (n_parameters,)
         Whole, SI.
+    noise : mapping of input to InputNoise, optional
+        None: as these records show it.
 
     Returns
     -------
     dict
         Output -> rms [its unit]; empty where all inputs are commands.
     """
-    noise, squares = pooled_noise([ready.record for ready in by_record(replays)]), dict[str, list[Array]]()
+    noise = pooled_noise([ready.record for ready in by_record(replays)]) if noise is None else noise
+    squares = dict[str, list[Array]]()
     for ready, signals in by_record(replays).items() if noise else ():
         sizes = [r.record.noise.rms for r in signals]
         for piece in answers(ready, signals, candidate, noise, sizes):

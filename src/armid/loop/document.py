@@ -219,8 +219,10 @@ def error_sentence(report: Mapping[str, Any]) -> str:
     text, errors = f"{was} before, {now} {unit} RMSE after;", [before[which], after[which]]
     if not report["effects"]:
         text, errors = f"{now} {unit} RMSE,", [after[which]]
-    noise = noise_text(of_those or report["noise_rms"], output, after[which])
-    return f"Error on {on}: {text} {noise}{alone}.{others_text(*errors)}{moved_text(report['outputs'], after[which])}"
+    unseen = which == "holdout"
+    noise = noise_text(of_those or report["noise_rms"], output, after[which], unseen)
+    moved = moved_text(report["outputs"], after[which], unseen)
+    return f"Error on {on}: {text} {noise}{alone}.{others_text(*errors)}{moved}"
 
 
 def step_table(report: Mapping[str, Any]) -> Table:

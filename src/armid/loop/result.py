@@ -227,9 +227,10 @@ class ClosedLoop(Result):
 
     @cached_property
     def outputs(self) -> dict[str, dict[str, Any]]:
-        """Output -> its unit, the noise of its train records, and how far noise of their inputs moves the model."""
+        """Output -> its unit, the noise of its train records, and how far noise of inputs moves the model."""
         levels, train = self.before.train.data.levels, self.after.train
-        return entries_of_noise(train.replays, levels, train.candidate)
+        unseen = () if self.after.holdout is None else self.after.holdout.replays
+        return entries_of_noise(train.replays, levels, train.candidate, unseen)
 
     @property
     def noise_rms(self) -> float:

@@ -379,13 +379,14 @@ def others_text(*errors: Mapping[str, Any] | None) -> str:
     return "".join(f" {name}: {' and '.join(texts)}." for name, texts in said.items())
 
 
-def noise_text(noise: float, output: Mapping[str, Any], error: Mapping[str, Any]) -> str:
+def noise_text(noise: float, output: Mapping[str, Any], error: Mapping[str, Any], unseen: bool) -> str:
     """Return the noise of an output, what noise of the inputs does to it, and whether that may be all that is left.
 
-    noise: [unit]. output: its entry of "outputs". error: of the model on the records that are spoken of.
+    noise: [unit]. output: its entry of "outputs". error: of the model on the records that are spoken of; unseen:
+    whether these are held out.
     """
     value, unit = shown(noise, output["unit"])
-    text, moved = f"the noise is {value:.3g} {unit}", moved_of(output)
+    text, moved = f"the noise is {value:.3g} {unit}", moved_of(output, unseen)
     text += f" ({output['noise_in_motion']})" if output.get("noise_in_motion") else ""
     if not inputs_act(noise, moved, error["rmse"]):
         return text
@@ -393,20 +394,28 @@ def noise_text(noise: float, output: Mapping[str, Any], error: Mapping[str, Any]
     return text + (", and what remains may be that alone" if may_be_inputs(noise, moved, error["rmse"]) else "")
 
 
-def moved_text(outputs: Mapping[str, Mapping[str, Any]], error: Mapping[str, Any]) -> str:
-    """Return how far noise of the inputs moves each output but the first, where this shows; error: of all outputs."""
+def moved_text(outputs: Mapping[str, Mapping[str, Any]], error: Mapping[str, Any], unseen: bool) -> str:
+    """Return how far noise of the inputs moves each output but the first, where this shows.
+
+    error: of all outputs, on the records that are spoken of; unseen: whether these are held out.
+    """
     text = ""
     for name, output in list(outputs.items())[1:]:
         left = error["outputs"].get(name, {"rmse": None})["rmse"]
-        if inputs_act(output["noise_rms"], moved_of(output), left):
-            (moved, unit), (noise, _) = (shown(x, output["unit"]) for x in (moved_of(output), output["noise_rms"]))
+        by = moved_of(output, unseen)
+        if inputs_act(output["noise_rms"], by, left):
+            (moved, unit), (noise, _) = (shown(x, output["unit"]) for x in (by, output["noise_rms"]))
             text += f" Noise of the inputs moves {name} by {moved:.3g} {unit}; that of its sensor is {noise:.3g}."
     return text
 
 
-def moved_of(output: Mapping[str, Any]) -> float:
-    """Return how far noise of the inputs moves an output; results of before this was asked do not hold it."""
-    return float(output.get("moved_by_inputs", 0.0))
+def moved_of(output: Mapping[str, Any], unseen: bool) -> float:
+    """Return how far noise of the inputs moves an output, on unseen records or those that were fitted.
+
+    Results of before this was asked do not hold it.
+    """
+    moved = output.get("moved_by_inputs", 0.0)
+    return float(output.get("moved_by_inputs_holdout", moved) if unseen else moved)
 
 
 def may_be_inputs(noise: float, moved: float, left: float | None) -> bool:
