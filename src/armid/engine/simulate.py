@@ -32,8 +32,8 @@ class Schedule:
     substeps: integration steps between samples, everywhere unless `rough` is given.
     refinement: times finer for `fresh_samples` samples from a one-way switch on, where the motion is fastest, and where
         a step is rough; what is refined follows without a jump.
-    stages: where a step is rough and the motion decays within it (friction that holds), one of so many stages that
-        bears this is tried before the finer ones, which are taken where it is rough too; 0: none is.
+    stages: of one step that bears motion which decays within it, as where friction holds. It is tried where a step is
+        rough and such motion is seen, before finer steps, which follow where it is rough too; 0: none is.
     rough: a sample takes one step, and where this step is rough `refinement`, in the lanes that ask for it: from which
         h (|k3 - k2| + |k1 - k2 - k3 + k4|) of its Runge-Kutta stages on, for each state [its unit], shape (n_states,).
         As accurate as `substeps` everywhere, which then only tells so; None: every sample is cut alike.
