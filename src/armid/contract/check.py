@@ -87,8 +87,10 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[C
 
 def far_from_typical(campaign: Campaign, plant: Plant) -> Iterator[ContractPoint]:
     """Ask about the unit of inputs that are a hundred times smaller or larger than what is typical of a plant."""
-    for of in (i for i in plant.inputs if i.typical is not None):
-        low, high = of.typical or (0.0, 0.0)
+    for of in plant.inputs:
+        if of.typical is None:
+            continue
+        low, high = of.typical
         largest = {r.file: max(float(np.max(np.abs(p.manoeuvre.inputs[of.name]))) for p in r.pieces)
                    for r in campaign.records}  # fmt: skip
         files = [f for f, x in largest.items() if x > 0.0 and not 1 / FAR < x / max(-low, high) < FAR]

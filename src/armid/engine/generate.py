@@ -35,8 +35,8 @@ IDLE = {"term": 0.0, "late": 0.0, "rate": 0.0, "guard": 1.0}
 TEMPLATE = Path(__file__).parent / "templates" / "kernel.py.jinja"
 TEMPLATES = (TEMPLATE, TEMPLATE.with_name("history.py.jinja"))
 # Prefixes of lists of names in the template.
-OF_STATES = ("a", "b", "m", "d", "e", "y", "k1", "k2", "k3", "k4", "fa", "fb", "fd")
-OF_INPUTS = ("ua", "um", "ub", "us", "uz", "u0", "u1", "ur", "p0", "p1", "vm", "vb")
+OF_STATES = ("a", "b", "m", "d", "e", "y", "k1", "k2", "k3", "k4", "fa", "fb")
+OF_INPUTS = ("ua", "um", "ub", "us", "uz", "u0", "u1", "ur", "p0", "p1")
 OF_CARRIED = ("n", "o", "r", "t")
 OF_OUTPUTS = ("rec",)
 OF_LATE_STATES = ("l", "ha", "hm", "hb", "hs", "hq", "hx", "w")

@@ -282,7 +282,7 @@ def length_of_rest(inputs: Sequence[Array], outputs: Sequence[tuple[Array, bool]
     Of growing lengths the last but one counts, as the motion may begin before this shows. Arguments as for
     `lengths_of_rest`.
     """
-    lengths = [0, *lengths_of_rest(inputs, outputs)] if inputs else [0]
+    lengths = [0, *lengths_of_rest(inputs, outputs)]
     return lengths[-2] if len(lengths) > 2 else lengths[-1]
 
 
