@@ -171,6 +171,11 @@ class Library:
         """Return the library with other data of the same records."""
         return replace(self, data=data, as_read=as_read, _problems={})
 
+    def of_records(self, which: Sequence[int]) -> "Library":
+        """Return the library with some of its records alone."""
+        read = None if self.as_read is None else self.as_read.of_records(which)
+        return replace(self.with_data(self.data.of_records(which), read), _schedules={})
+
     def recalibrated(self, active: Active, values: Mapping[str, float], misfit: float) -> WhiteRecords | None:
         """Return the problem with finer steps where those at hand are too coarse at some values, else None.
 

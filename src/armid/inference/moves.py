@@ -42,9 +42,9 @@ class Exploration:
 
     fits: by the hypotheses that hold in it. forecasts: of each model that was expanded. noise: the scale, None: that of
     the model that leaves least. completed: models that were brought to their estimates, and the weight of a square at
-    which they were. n_expanded: how often a model was expanded, in usual expansions. refused: models that diverge, are
-    hopeless, or hold a fault that hardly moves its record. in_vain: models that were expanded in turn without a better
-    one, far from the noise.
+    which they were. is_led: whether a search on some of the records led to the first models. n_expanded: how often a
+    model was expanded, in usual expansions. refused: models that diverge, are hopeless, or hold a fault that hardly
+    moves its record. in_vain: models that were expanded in turn without a better one, far from the noise.
     """
 
     library: Library
@@ -56,6 +56,7 @@ class Exploration:
     forecasts: dict[Hypotheses, list[Forecast]] = field(default_factory=dict)
     noise: Scale | None = None
     completed: dict[Hypotheses, float] = field(default_factory=dict)
+    is_led: bool = False
     n_expanded: float = 0.0
     refused: set[Hypotheses] = field(default_factory=set)
     in_vain: int = 0

@@ -16,11 +16,12 @@ from armid.estimation.constants import NAMED
 from armid.inference.candidates import EffectKey
 from armid.inference.checks import is_significant
 from armid.inference.decisions import HOPELESS, REFITTED, WINDOW
+from armid.inference.declared import declared_again
 from armid.inference.evidence import expansion_of, forecast
 from armid.inference.kinds import drifts, effects, faults, unknown
 from armid.inference.kinds.hypothesis import Hypotheses, Hypothesis, Proposal, may_join, words
 from armid.inference.library import Library
-from armid.inference.model import Fit, finished, unless_diverged, with_free_shapes
+from armid.inference.model import Fit, accurate, finished, fit_from, start_of, unless_diverged, with_free_shapes
 from armid.inference.model import freed as freed_shape
 from armid.inference.moves import (
     Exploration,
@@ -39,6 +40,7 @@ from armid.inference.moves import (
 )
 from armid.inference.shooting import on_short_pieces, on_whole_records
 from armid.inference.unknowns import Unknown, constants_of, freed, polished
+from armid.inference.whitening import WhitenedData
 from armid.problem.starts import fits_starts
 
 # Budgets of computing. Additions that are fitted at each model.
@@ -50,6 +52,8 @@ MOST_EXPANDED, MOST_EFFECTS = 16, 8
 # Above so many samples fewer models are expanded, but at least so many; so many constants within tolerances halve the
 # number.
 SAMPLES, FEWEST_EXPANDED, USUAL_CONSTANTS = 4_000, 8, 10
+# Where there are many samples some records are looked at first: about so many samples.
+SAMPLES_LOOKED_AT = 6_000
 # Steps between samples; an expansion with more counts as several: friction as sharp as a fast machine shows it.
 USUAL_STEPS = 16.0
 # Far from the noise: expansions without a better model after which the search stops, as what is missing has no name.
@@ -70,9 +74,7 @@ def explore(library: Library, declared: Fit, until: Callable[[Fit], bool] = lamb
     declared: its fit. until: whether a fit that leads, after an expansion, is reason to stop at once.
     """
     exploration = begun(library, declared)
-    expand_all(exploration, 1)
-    if not is_near(exploration):
-        take_from_short_pieces(exploration)
+    take_from_some_records(exploration)
     if expand_all(exploration, None, until) and add_unknown(exploration):
         expand_all(exploration, None, until)
     if until(exploration.fits[exploration.ranked()[0][0]]):
@@ -108,7 +110,8 @@ def expand_all(exploration: Exploration, most: int | None, until: Callable[[Fit]
     most: models that are expanded in all, None: as many as the samples allow. until: see `explore`.
     """
     cost = len(exploration.declared.residual) / SAMPLES * (1.0 + len(exploration.constants) / USUAL_CONSTANTS)
-    most = most or int(np.clip(MOST_EXPANDED / cost, FEWEST_EXPANDED, MOST_EXPANDED))
+    fewest = 1 if exploration.is_led else FEWEST_EXPANDED
+    most = most or int(np.clip(MOST_EXPANDED / cost, fewest, MOST_EXPANDED))
     while exploration.n_expanded < most and exploration.in_vain < MOST_IN_VAIN:
         model, best = next_model(exploration), exploration.ranked()[0][0]
         if until(exploration.fits[best]):
@@ -137,6 +140,52 @@ def expansions_of(fit: Fit) -> float:
     return max(1.0, max(c.schedule.least for r in fit.records.replays for c in r.calibrations) / USUAL_STEPS)
 
 
+def look(exploration: Exploration) -> None:
+    """Expand the declared model, and far from the noise take what leads on short pieces."""
+    expand_all(exploration, 1)
+    if not is_near(exploration):
+        take_from_short_pieces(exploration)
+
+
+def take_from_some_records(exploration: Exploration) -> None:
+    """Take the models that lead on some of many long records; where there are not so many, look at all.
+
+    Their faults are left to the search on all records, which can tell a fault from an effect.
+    """
+    library = exploration.library
+    which = some_records(library.data)
+    if which is None:
+        look(exploration)
+        return
+    library.say(f"looking at {len(which)} of {len(library.data.records)} records")
+    few = library.of_records(which)
+    some = begun(few, declared_again(few, exploration.declared))
+    look(some)
+    expand_all(some, None)
+    finish(some)
+    leaders: dict[Hypotheses, Fit] = {}
+    for model, _ in some.ranked():
+        leaders.setdefault(frozenset(h for h in model if h.kind == "effect"), some.fits[model])
+    carried = [m for m in leaders if m][:BEAM]
+    again = library.each(lambda m: unless_diverged(partial(carried_on, leaders[m], library)), carried)
+    for model, fit in zip(carried, again, strict=True):
+        exploration.take(model, fit and with_constants(fit, exploration.constants, exploration.scale().weight))
+    exploration.is_led = bool(carried)
+
+
+def some_records(data: WhitenedData) -> list[int] | None:
+    """Return which records are looked at first: every so many; None where that is not half of the samples less."""
+    n = len(data.records)
+    n_some = int(np.ceil(n * SAMPLES_LOOKED_AT / len(data.sound)))
+    return None if 2 * n_some > n else [(2 * i + 1) * n // (2 * n_some) for i in range(n_some)]
+
+
+def carried_on(fit: Fit, library: Library) -> Fit:
+    """Return a fit to some records carried on to all, its constants as declared."""
+    problem = library.problem(fit.active, fit.values)
+    return accurate(fit_from(problem, fit.active, [start_of(problem, fit.values)]), library)
+
+
 def take_from_short_pieces(exploration: Exploration) -> None:
     """Take the models that lead on short pieces of the records, carried on to the whole ones: see `shooting`."""
     library, constants = exploration.library, exploration.constants
@@ -147,8 +196,8 @@ def take_from_short_pieces(exploration: Exploration) -> None:
     short = begun(*begin)
     expand_all(short, FEWEST_EXPANDED)
     leaders = [m for m, _ in short.ranked() if m and all(h.kind == "effect" for h in m)][:BEAM]
-    carried = library.each(lambda m: unless_diverged(partial(on_whole_records, short.fits[m], library)), leaders)
-    for model, fit in zip(leaders, carried, strict=True):
+    again = library.each(lambda m: unless_diverged(partial(on_whole_records, short.fits[m], library)), leaders)
+    for model, fit in zip(leaders, again, strict=True):
         weight = exploration.scale().weight
         exploration.take(model, fit and with_constants(fit, constants, weight))
 
@@ -229,14 +278,16 @@ def next_model(exploration: Exploration) -> Hypotheses | None:
     """Return the model that is to be expanded next, None where all in the window are.
 
     Where the best model leaves more than noise, the best effect-only models of each size up to its own may lead on as
-    well: a strong second effect can mislead the choice of the first. Far from the noise these come first (a beam).
+    well: a strong second effect can mislead the choice of the first. Far from the noise these come first (a beam). They
+    do so on some of the records, where these are looked at first.
     """
     ranked = exploration.ranked()
     best, top = ranked[0]
     expanded = [(m, value) for m, value in ranked if m in exploration.forecasts]
     near = [m for m, value in ranked if value > top - WINDOW
             and not (is_outdone(m, value, ranked) or has_expanded_form(m, value, expanded))]  # fmt: skip
-    if is_significant(exploration.fits[best]) and exploration.fits[best].records.data.cover is None:
+    is_left = is_significant(exploration.fits[best]) and exploration.fits[best].records.data.cover is None
+    if is_left and not exploration.is_led:
         plain = [m for m, _ in ranked if all(h.kind == "effect" for h in m)]
         beam = [m for n in range(1, len(best) + 1) for m in [m for m in plain if len(m) == n][:BEAM]]
         near = [*near, *beam] if is_near(exploration) else [*beam, *near]

@@ -139,6 +139,15 @@ class WhitenedData:
         """Return the records with another noise."""
         return with_standstills(replace(self, levels=levels, sound=soundness_of(self.each, levels)))
 
+    def of_records(self, which: Sequence[int]) -> "WhitenedData":
+        """Return the data of some of the records."""
+        signals = np.cumsum([0, *(len(r.each) for r in self.records)])
+        own = [i for k in which for i in range(signals[k], signals[k + 1])]
+        rows = np.concatenate([np.arange(self.edges[i], self.edges[i + 1]) for i in own])
+        blocks = tuple(replace(b, at=np.searchsorted(rows, b.at)) for b in self.blocks if np.isin(b.at[0], rows))
+        return replace(self, records=tuple(self.records[k] for k in which), levels=tuple(self.levels[i] for i in own),
+                       sound=self.sound[rows], blocks=blocks)  # fmt: skip
+
     @property
     def known(self) -> bool:
         return all(level.known for level in self.levels)

@@ -1,0 +1,67 @@
+"""Long campaigns: some of the records are looked at first, and what leads there is fitted to all."""
+
+import numpy as np
+import pytest
+
+from armid.inference import infer, prepared, search
+from armid.inference.whitening import whitened
+from armid.model import EFFECTS, Model
+from armid.record import read_campaign
+from synthetic import write_records
+
+MASS, FRICTION, STEP_S, N, REST = 2.0, 3.0, 0.02, 180, 60
+HEAD = 'name = "many"\nplant = "driven_axis"\nhold = "zero"\n'
+FEW = ("coulomb", "viscous", "drive_gain")
+
+
+def campaign(folder, noise, count):
+    """Eight records of an axis with dry friction, at rest first; count: the step of the sensor."""
+    rng, tables = np.random.default_rng(61), {}
+    for i in range(8):
+        force = np.where(np.arange(N) < REST, 0.0, np.repeat(rng.normal(0.0, 15.0, N // 10), 10))
+        now, speed = 0.0, [0.0]
+        for f in force[:-1]:
+            for _ in range(50):
+                after = now + STEP_S / 50 * f / MASS
+                now = np.sign(after) * max(abs(after) - STEP_S / 50 * FRICTION / MASS, 0.0)
+            speed.append(now)
+        measured = np.round((speed + noise * rng.standard_normal(N)) / count) * count
+        tables[f"r{i}.csv"] = {"time_s": STEP_S * np.arange(N), "velocity_m_s": measured, "drive_N": force}
+    return read_campaign(write_records(folder, HEAD, tables, holdout=0))
+
+
+def test_data_of_some_records_have_the_noise_that_all_have(tmp_path):
+    coarse = campaign(tmp_path, 0.002, 0.02)
+    whole = whitened(coarse.train, coarse.plant)
+    which = [1, 4, 7]
+    some = whole.of_records(which)
+    own = [i for i, one in enumerate(whole.each) if one.file in {coarse.train[k].file for k in which}]
+    assert [r.file for r in some.records] == [coarse.train[k].file for k in which]
+    assert len(whole.blocks) > len(some.blocks) > 0
+    signals = [np.random.default_rng(i).standard_normal((2, r.n_samples)) for i, r in enumerate(whole.each)]
+    parts = whole.by_record(whole.white(signals))
+    assert np.array_equal(some.white([signals[i] for i in own]), np.concatenate([parts[i] for i in own], axis=-1))
+
+
+@pytest.mark.slow
+def test_what_leads_on_some_records_is_fitted_to_all(tmp_path, monkeypatch):
+    many = campaign(tmp_path, 0.01, 1e-4)
+    n_samples = len(whitened(many.train, many.plant).sound)
+    monkeypatch.setattr(search, "SAMPLES_LOOKED_AT", n_samples // 4)
+    said, effects = [], {n: EFFECTS[n] for n in FEW}
+    found = infer(*prepared(Model(many.plant), many, effects, told=said.append))
+    assert any(s.startswith("looking at 2 of 8 records") for s in said)
+    assert found.exploration.is_led
+    assert found.probabilities["effects"]["coulomb"] > 0.95
+    best = found.exploration.fits[found.in_force]
+    assert len(best.residual) == n_samples
+    assert best.values["mass"] == pytest.approx(MASS, rel=0.01)
+    (level,) = (value for name, value in best.values.items() if name.endswith(".level"))
+    assert level == pytest.approx(FRICTION, rel=0.02)
+
+
+@pytest.mark.parametrize(("n_samples", "which"), [(40_000, [1, 4]), (11_000, None), (24_000, [1, 4]), (6_000, None)])
+def test_which_records_are_looked_at(monkeypatch, n_samples, which):
+    data = type("Data", (), {"records": (None,) * 6, "sound": np.ones(n_samples)})()
+    monkeypatch.setattr(search, "SAMPLES_LOOKED_AT", 8_000)
+    assert search.some_records(data) == which
