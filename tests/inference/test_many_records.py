@@ -1,5 +1,7 @@
 """Long campaigns: some of the records are looked at first, and what leads there is fitted to all."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -46,15 +48,15 @@ def test_data_of_some_records_have_the_noise_that_all_have(tmp_path):
 @pytest.mark.slow
 def test_what_leads_on_some_records_is_fitted_to_all(tmp_path, monkeypatch):
     many = campaign(tmp_path, 0.01, 1e-4)
-    n_samples = len(whitened(many.train, many.plant).sound)
-    monkeypatch.setattr(search, "SAMPLES_LOOKED_AT", n_samples // 4)
+    data = whitened(many.train, many.plant)
+    monkeypatch.setattr(search, "SAMPLES_LOOKED_AT", data.n_simulated // 4)
     said, effects = [], {n: EFFECTS[n] for n in FEW}
     found = infer(*prepared(Model(many.plant), many, effects, told=said.append))
     assert any(s.startswith("looking at 2 of 8 records") for s in said)
     assert found.exploration.is_led
     assert found.probabilities["effects"]["coulomb"] > 0.95
     best = found.exploration.fits[found.in_force]
-    assert len(best.residual) == n_samples
+    assert len(best.residual) == len(data.sound)
     assert best.values["mass"] == pytest.approx(MASS, rel=0.01)
     (level,) = (value for name, value in best.values.items() if name.endswith(".level"))
     assert level == pytest.approx(FRICTION, rel=0.02)
@@ -62,6 +64,6 @@ def test_what_leads_on_some_records_is_fitted_to_all(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(("n_samples", "which"), [(40_000, [1, 4]), (11_000, None), (24_000, [1, 4]), (6_000, None)])
 def test_which_records_are_looked_at(monkeypatch, n_samples, which):
-    data = type("Data", (), {"records": (None,) * 6, "sound": np.ones(n_samples)})()
+    data = SimpleNamespace(records=(None,) * 6, n_simulated=n_samples)
     monkeypatch.setattr(search, "SAMPLES_LOOKED_AT", 8_000)
     assert search.some_records(data) == which

@@ -1,7 +1,8 @@
 """Explore models: while one that may be right is not expanded, fit its neighbours (`moves` says which these are).
 
 Occam's window (Madigan, Raftery 1994, doi:10.1080/01621459.1994.10476894): models whose posterior is far below that
-of the best are not expanded. Leading forecasts are then fitted, because a forecast only ranks.
+of the best are not expanded. Leading forecasts are then fitted, because a forecast only ranks. Of many long records some
+are looked at first: what leads there is fitted to all, and is where the search on all of them begins.
 """
 
 from collections import Counter
@@ -174,9 +175,9 @@ def take_from_some_records(exploration: Exploration) -> None:
 
 
 def some_records(data: WhitenedData) -> list[int] | None:
-    """Return which records are looked at first: every so many; None where that is not half of the samples less."""
+    """Return which records are looked at first: every so many; None where that would spare less than half."""
     n = len(data.records)
-    n_some = int(np.ceil(n * SAMPLES_LOOKED_AT / len(data.sound)))
+    n_some = int(np.ceil(n * SAMPLES_LOOKED_AT / data.n_simulated))
     return None if 2 * n_some > n else [(2 * i + 1) * n // (2 * n_some) for i in range(n_some)]
 
 

@@ -130,6 +130,11 @@ class WhitenedData:
         """Samples in the windows of the pieces of each record."""
         return tuple(r.lengths for r in self.each)
 
+    @property
+    def n_simulated(self) -> int:
+        """Samples of one simulation of all records; a sensor that holds its value shows fewer."""
+        return sum(piece.manoeuvre.n_samples for record in self.records for piece in record.pieces)
+
     @cached_property
     def edges(self) -> NDArray[np.int64]:
         """Where the records begin in a vector of all samples, and its end, (n_records + 1,)."""
