@@ -110,7 +110,7 @@ def expand_all(exploration: Exploration, most: int | None, until: Callable[[Fit]
 
     most: models that are expanded in all, None: as many as the samples allow. until: see `explore`.
     """
-    cost = len(exploration.declared.residual) / SAMPLES * (1.0 + len(exploration.constants) / USUAL_CONSTANTS)
+    cost = exploration.library.data.n_simulated / SAMPLES * (1.0 + len(exploration.constants) / USUAL_CONSTANTS)
     fewest = 1 if exploration.is_led else FEWEST_EXPANDED
     most = most or int(np.clip(MOST_EXPANDED / cost, fewest, MOST_EXPANDED))
     while exploration.n_expanded < most and exploration.in_vain < MOST_IN_VAIN:
