@@ -17,7 +17,7 @@ NUMERICS = {
     "convergence of fits and of the engine": ("SETTLED_COST", "NEAR_NOISE", "FEWEST_SPARED", "FURTHER_ERROR",
                                               "WIDE", "FORETOLD", "UNTOLD"),
     "budgets of computing": ("FEWEST_IN_BUNDLES", "MOST_IN_VAIN", "MOST_EFFECTS", "MOST_OF_SIZE", "MOST_RIVALS",
-                             "FEWEST_OF_PART", "FEW_PLACES"),
+                             "FEWEST_OF_PART", "FEW_PLACES", "SPARED"),
     "estimate of the noise": ("FEWEST_FOR_COLOUR", "FEWEST_ORDINATES", "MOST_LAGS_OF_NOISE", "LINE_OF_MAINS",
                               "MOST_BRIDGED", "STILL", "EVEN_SPEED", "MISFIT", "ENGINE_ERRORS", "CHANCE_OF_COLOUR",
                               "CERTAIN", "TRIFLE"),
