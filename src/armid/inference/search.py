@@ -1,8 +1,8 @@
 """Explore models: while one that may be right is not expanded, fit its neighbours (`moves` says which these are).
 
 Occam's window (Madigan, Raftery 1994, doi:10.1080/01621459.1994.10476894): models whose posterior is far below that
-of the best are not expanded. Leading forecasts are then fitted, because a forecast only ranks. Of many long records some
-are looked at first: what leads there is fitted to all, and is where the search on all of them begins.
+of the best are not expanded. Leading forecasts are then fitted, because a forecast only ranks. Of many long records
+some are looked at first: what leads there is fitted to all, and is where the search on all of them begins.
 """
 
 from collections import Counter
