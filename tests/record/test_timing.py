@@ -5,7 +5,7 @@ import pytest
 
 from armid.errors import ArmidError
 from armid.record import IrregularSamplingWarning, read_campaign
-from armid.record.resample import moved_onto_grid, onto_grid, timing_of
+from armid.record.resample import fed_through, moved_onto_grid, onto_grid, timing_of
 
 
 def motion(times):
@@ -118,6 +118,34 @@ def test_noise_stays_white_on_the_grid():
     grid = timing.start + timing.interval * np.arange(timing.n_samples)
     # a line between two rows is off by 9^2 0.005^2 / 8
     np.testing.assert_allclose(moved[data], np.sin(9.0 * grid)[data], atol=1.3e-4)
+
+
+def test_what_jumps_with_a_held_input_jumps_where_the_input_does_on_the_grid():
+    """A current follows its voltage at once, a speed later."""
+    rng, step, n = np.random.default_rng(8), 0.01, 900
+    times = step * np.arange(n) + np.append(0.0, rng.uniform(-3e-3, 3e-3, n - 1))
+    voltage = np.repeat(rng.normal(0.0, 6.0, n // 30), 30)
+    with pytest.warns(IrregularSamplingWarning):
+        timing = timing_of(times, False, "x.csv")
+
+    def speed_at(places):
+        """Speed of a motor with a time constant of 0.1 s, its voltage held from each row on."""
+        speed = np.append(0.0, np.zeros(n - 1))
+        for k in range(n - 1):
+            speed[k + 1] = voltage[k] + (speed[k] - voltage[k]) * np.exp(-(times[k + 1] - times[k]) / 0.1)
+        last = np.maximum(np.searchsorted(times, places, side="right") - 1, 0)
+        return voltage[last] + (speed[last] - voltage[last]) * np.exp(-(places - times[last]) / 0.1)
+
+    every, grid = np.ones(n, dtype=bool), timing.grid()
+    held = onto_grid(voltage, times, timing, "zero")
+    noise = 0.01 * rng.standard_normal(n)
+    current, data = moved_onto_grid(2.0 * (voltage - speed_at(times)) + noise, times, timing, every, [voltage])
+    assert np.std((current - 2.0 * (held - speed_at(grid)))[data]) < 0.02
+    assert fed_through(2.0 * (voltage - speed_at(times)) + noise, every, [voltage])[0] == pytest.approx(2.0, abs=0.01)
+    speed, data = moved_onto_grid(speed_at(times) + noise, times, timing, every, [voltage])
+    alone, _ = moved_onto_grid(speed_at(times) + noise, times, timing, every)
+    assert np.std((speed - alone)[data]) < 0.005
+    assert abs(fed_through(speed_at(times) + noise, every, [voltage])[0]) < 0.01
 
 
 @pytest.mark.parametrize(("times", "found"), [

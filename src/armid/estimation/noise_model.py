@@ -24,6 +24,8 @@ from armid.record import Noise, Record
 from armid.record.sensor import FEWEST_REST_SAMPLES, changing, correlation_sum, difference_rms, memory_of, new_share
 
 T = TypeVar("T")
+# Output, sampling interval [s] and step [unit of the output].
+SensorKey = tuple[str, float, str]
 MOST_TERMS, FEWEST_FOR_COLOUR, MOST_LAGS_OF_NOISE = 8, 50, 500
 # A mean square of the residual above this many times that of the noise is not noise; below this many errors of the
 # engine it is the engine's.
@@ -129,7 +131,7 @@ def without_alternation(values: Array, alternation: float) -> Array:
 
 
 def noise_levels(records: Sequence[Record], plant: Plant, others: Sequence[Record] = ()) -> tuple[NoiseModel, ...]:
-    """Return the noise of each record: pooled over the rests of all records of one output and sampling interval.
+    """Return the noise of each record: pooled over the rests of all records of one sensor, see `sensor_of`.
 
     plant: the sizes of its outputs give the floor below which the engine's error would count as a discrepancy. others:
     records of the same sensors whose rests count too.
@@ -142,14 +144,17 @@ def noise_levels(records: Sequence[Record], plant: Plant, others: Sequence[Recor
     return tuple(pooled[sensor_of(r)] for r in records)
 
 
-def sensor_of(record: Record) -> tuple[str, float]:
-    """Return the output and the sampling interval of a record: its noise is that of all records with the same."""
-    return record.output, record.manoeuvre.interval
+def sensor_of(record: Record) -> SensorKey:
+    """Return output, sampling interval and step of a record: its noise is that of all records with the same.
+
+    The step to three digits, as far as two records tell the same.
+    """
+    return record.output, record.manoeuvre.interval, f"{record.signals[0].sensor.step:.3g}"
 
 
-def by_sensor(records: Sequence[Record], values: Sequence[T]) -> dict[tuple[str, float], list[T]]:
+def by_sensor(records: Sequence[Record], values: Sequence[T]) -> dict[SensorKey, list[T]]:
     """Return the values of the records of each sensor."""
-    groups: dict[tuple[str, float], list[T]] = {}
+    groups: dict[SensorKey, list[T]] = {}
     for record, value in zip(records, values, strict=True):
         groups.setdefault(sensor_of(record), []).append(value)
     return groups

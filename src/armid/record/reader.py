@@ -87,7 +87,8 @@ def record_of(table: CsvTable, sheet: RecordSheet, campaign: CampaignSheet, plan
     driven = {i.name: table.numbers(sources[i.name]) * input_factor(sources[i.name], i.unit, table)
               for i in plant.inputs if i.name in sources}  # fmt: skip
     most_lost = campaign.most_lost if sheet.most_lost is None else sheet.most_lost
-    read = partial(signal_of, table, times, timing, list(driven.values()), campaign.unwrap, most_lost)
+    held = [driven[i.name] for i in plant.inputs if i.name in driven and (i.hold or hold) == "zero"]
+    read = partial(signal_of, table, times, timing, list(driven.values()), held, campaign.unwrap, most_lost)
     measured = [read(header, o.factors[header], o.unit, o.name) for o, header in outputs.items()]
     if campaign.gyro_range_deg_s is not None:
         check_range(measured, campaign.gyro_range_deg_s, table)
@@ -118,12 +119,12 @@ def record_of(table: CsvTable, sheet: RecordSheet, campaign: CampaignSheet, plan
 
 
 def signal_of(
-    table: CsvTable, times: Array, timing: Timing, inputs: Sequence[Array], unwrap: bool, most_lost: float,
-    header: str, factor: float, unit: str, output: str = "",
+    table: CsvTable, times: Array, timing: Timing, inputs: Sequence[Array], held: Sequence[Array], unwrap: bool,
+    most_lost: float, header: str, factor: float, unit: str, output: str = "",
 ) -> tuple[Signal, Array]:  # fmt: skip
     """Return the signal of a column of a file, and the column, SI, (n_rows,); warn of what of it is not data.
 
-    inputs: the columns that drive the machine, (n_rows,) each. unwrap: whether whole turns are taken out. most_lost:
+    inputs: the columns that drive the machine, (n_rows,) each; held: those that keep each value. unwrap: whether whole turns are taken out. most_lost:
     share of the samples that may be no data. factor: to the SI unit, NaN for counts. output: whose signal it is, which
     has to show a motion; "" for one that serves a start alone.
     Raises ArmidError for a column with too few numbers or too many that are no data.
@@ -153,7 +154,7 @@ def signal_of(
     faults = [lost(table, header, kind, at, times) for kind, at in broken.items() if at.size]
     check_lost(table, header, faults, n_new, most_lost)
     check_number(int(rows[timing.first :].sum()), f"{table.file}: {header} has", DATA_IN_MOTION)
-    measured, data = moved_onto_grid(values, times, timing, rows)
+    measured, data = moved_onto_grid(values, times, timing, rows, held)
     if output and is_constant(values[timing.first :][rows[timing.first :]]):
         what = "speed" if is_speed else output
         raise ArmidError(f"{table.file}: the measured {what} is constant after the start, a motion is expected")

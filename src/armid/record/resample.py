@@ -193,14 +193,21 @@ def onto_grid(values: Array, times: Array, timing: Timing, hold: str = "linear")
     return np.asarray(np.where(changed, mean, own_value) - late + np.append(0.0, late[:-1]))
 
 
-def moved_onto_grid(values: Array, times: Array, timing: Timing, rows: Mask) -> tuple[Array, Mask]:
+def moved_onto_grid(
+    values: Array, times: Array, timing: Timing, rows: Mask, held: Sequence[Array] = ()
+) -> tuple[Array, Mask]:  # fmt: skip
     """Return a noisy column on the even grid and which of its samples were measured, both (n_samples,).
 
     Each grid sample takes the nearest row, moved along a parabola through 7 neighbours: the noise stays that of one
     sample and white, where a line between two rows would take a third off its variance and correlate neighbours. Where
-    no row of data is near, a straight line runs between those around.
-    values, times, rows (which are data): (n_rows,).
+    no row of data is near, a straight line runs between those around. What jumps with a held input is not moved: it
+    jumps where the input does on the grid.
+    values, times, rows (which are data), held (columns of inputs): (n_rows,).
     """
+    if timing.resampled and held:
+        share = fed_through(values, rows, held)
+        smooth, data = moved_onto_grid(values - share @ np.array(held), times, timing, rows)
+        return smooth + share @ np.array([onto_grid(u, times, timing, "zero") for u in held]), data
     known = values if rows.all() else np.where(rows, values, np.interp(times, times[rows], values[rows]))
     if not timing.resampled:
         return np.ascontiguousarray(known[timing.first :]), rows[timing.first :].copy()
@@ -217,6 +224,20 @@ def moved_onto_grid(values: Array, times: Array, timing: Timing, rows: Mask) -> 
     apart = times[right] - times[right - 1] - timing.finer * timing.interval
     gap = np.maximum(np.abs(along), apart) > timing.widest
     return np.where(gap, np.interp(grid, times, known), moved), data
+
+
+def fed_through(values: Array, rows: Mask, held: Sequence[Array]) -> Array:
+    """Return by how much a column changes at once with each of some held inputs, (n_inputs,).
+
+    Least squares of y_k = b u_k + c u_(k-1) + d u_(k-2) + e y_(k-1) + f y_(k-2) + g over the rows that are data.
+    """
+    y, u = values[rows], np.array(held)[:, rows]
+    known = np.vstack(
+        [u[:, 2:], u[:, 1:-1], u[:, :-2], y[np.newaxis, 1:-1], y[np.newaxis, :-2], np.ones((1, y.size - 2))]
+    )
+    sizes = np.maximum(np.max(np.abs(known), axis=1), 1e-300)
+    solution, *_ = np.linalg.lstsq((known / sizes[:, np.newaxis]).T, y[2:], rcond=None)
+    return np.asarray(solution[: len(held)] / sizes[: len(held)])
 
 
 def gap_samples(times: Array, timing: Timing) -> Mask:
