@@ -124,9 +124,9 @@ def signal_of(
 ) -> tuple[Signal, Array]:  # fmt: skip
     """Return the signal of a column of a file, and the column, SI, (n_rows,); warn of what of it is not data.
 
-    inputs: the columns that drive the machine, (n_rows,) each; held: those that keep each value. unwrap: whether whole turns are taken out. most_lost:
-    share of the samples that may be no data. factor: to the SI unit, NaN for counts. output: whose signal it is, which
-    has to show a motion; "" for one that serves a start alone.
+    inputs: the columns that drive the machine, (n_rows,) each; held: those that keep each value. unwrap: whether whole
+    turns are taken out. most_lost: share of the samples that may be no data. factor: to the SI unit, NaN for counts.
+    output: whose signal it is, which has to show a motion; "" for one that serves a start alone.
     Raises ArmidError for a column with too few numbers or too many that are no data.
     """
     raw, is_speed = table.numbers(header, gaps=True), unit in ("rad/s", "m/s")
