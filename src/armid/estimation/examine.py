@@ -15,6 +15,7 @@ from armid.estimation.information import (
     SINGULAR,
     Information,
     Profile,
+    covariance_by_inputs,
     information_at,
     information_of,
     normalised,
@@ -27,7 +28,7 @@ from armid.estimation.least_squares import (
     weighted_records,
     with_fitted_starts,
 )
-from armid.estimation.noise_model import Level, level_weights, levels_of
+from armid.estimation.noise_model import Level, known_level, level_weights, levels_of
 from armid.model import Array, Model
 from armid.problem.problem import Replay, replays
 from armid.problem.space import Space
@@ -111,9 +112,9 @@ class Examination(Result):
     """What the train records say about the free parameters at one candidate; it prints itself.
 
     x: SI, (n_free,): the least-squares estimate, or the point that was asked for (given). minimum: the least-squares
-    estimate. information: at x. combinations: what is known only together with constants, in words. wider: standard
-    deviations that count the tolerances of the constants, SI. profiles: one for each free parameter, about the minimum.
-    offers: what one more record would buy, the best first.
+    estimate. information: at x, noise of measured inputs counted. combinations: what is known only together with
+    constants, in words. wider: standard deviations that count the tolerances of the constants, SI. profiles: one for
+    each free parameter, about the minimum. offers: what one more record would buy, the best first.
     """
 
     kind: ClassVar[Kind] = IDENTIFIABILITY
@@ -185,12 +186,15 @@ def examine(
     minimum = records.values(z)
     at = minimum if x is None else start
     information = information_at(train, space, at, levels_of(train, space, at, noise), records.weights)
+    by_inputs = covariance_by_inputs(train, space, at, tuple(map(known_level, train)))
+    information = information.widened(by_inputs)
     weighed = WeightedRecords(train, space, level_weights(information.levels))
     z_at = weighed.shares(at)
     residual, slopes = weighed.residual_and_slopes(z_at)
     within = products(weighed, z_at, campaign.tolerances)
     relative = slopes * (at / weighed.span)
-    wider = information_of(weighed, z_at, None, columns_of(within, len(residual))).deviation
+    alone = information_of(weighed, z_at, None, columns_of(within, len(residual))).deviation
+    wider = np.sqrt(alone**2 + np.diag(by_inputs))
     levels = expected_levels(train, information.levels)
     motions = Motions(train, space.complete(at[np.newaxis])[0], campaign.gyro_range)
     grid = manoeuvre_grid(model, [r.record for r in train])

@@ -279,7 +279,7 @@ def point_remarks(examination: Examination) -> list[str]:
                 f"{away.max():.3g} standard deviations from it. The profiles are drawn around the minimum. All other "
                 "results belong to the point."]  # fmt: skip
     if not examination.given and wider.max() >= WIDENS:
-        return [f"Records start from measured states, whose noise widens the deviation of {names[int(wider.argmax())]} "
+        return [f"Noise of measured starts or inputs widens the deviation of {names[int(wider.argmax())]} "
                 f"{wider.max():.3g} times; the profiles do not show it."]  # fmt: skip
     return []
 
