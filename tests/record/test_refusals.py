@@ -105,6 +105,8 @@ TOML = {
     "restart of an arm": (GOOD + "restart_s = 1.0", ["'lower.csv'", "restart_s", "starts at rest"]),
     "window of one": (GOOD + "window_s = [0.7]", ["'window_s' is [0.7]", "[begin, end]"]),
     "unknown parameter": (GOOD + "[parameters.etta3]\nlow = 1.0", ["parameter 'etta3'", "did you mean 'eta3'"]),
+    "a constant as a parameter": (GOOD + "[parameters.I01]\nlow = 1.0",
+                                  ["campaign.toml: 'I01' under [parameters] is a constant", "[tolerances]"]),
     "crossed bounds": (GOOD + "[parameters.p0]\nlow = 3.2e6\nhigh = 3.1e6", ["parameters.p0", "3.2e+06", "low below"]),
     "low above the declared high": (GOOD + "[parameters.p0]\nlow = 5e6", ["parameters.p0", "5e+06", "3.5e+06"]),
     "repeat of nothing": (GOOD + 'repeat_of = "lowr.csv"', ["repeat_of 'lowr.csv'", "another record"]),

@@ -69,8 +69,8 @@ def simulate_command(
 
 
 DEFAULT_IDENTIFIER = (
-    "pso+least_squares: no other of 20 identifiers ends nearer to the truth in results/benchmark, and its swarm looks "
-    "at the whole box; cmaes for a fitness that is not a sum of squares"
+    "pso+least_squares: no other of 20 identifiers and chains ends nearer to the truth in results/benchmark, and its "
+    "swarm looks at the whole box; cmaes for a fitness that is not a sum of squares"
 )
 
 
