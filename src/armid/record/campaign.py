@@ -474,8 +474,8 @@ def overrides_of(
     known, overrides = named_parameters(plant, effects), {}
     for name, table in flattened(tables).items():
         if name not in known and name in {c.name for c in plant.constants}:
-            raise ArmidError(f"{where}: '{name}' under [parameters] is a constant of plant '{plant.name}': its value is "
-                             "expected under [constants], and how well that is known under [tolerances]")  # fmt: skip
+            raise ArmidError(f"{where}: '{name}' under [parameters] is a constant of plant '{plant.name}': its value "
+                             "is expected under [constants], how well that is known under [tolerances]")  # fmt: skip
         if name not in known:
             raise unknown_name("parameter", name, known, where)
         place = f"{where}, parameters.{name}"
