@@ -22,6 +22,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.special import log_ndtr, logsumexp
 
 from armid.estimation.constants import NAMED
+from armid.estimation.least_squares import AT_BOUND
 from armid.inference.candidates import EffectKey
 from armid.inference.checks import is_significant
 from armid.inference.decisions import OUT_OF_TOLERANCE
@@ -39,6 +40,8 @@ USUAL_STRENGTH = 0.525
 WRONG_TOLERANCE = 3.0
 # Fewest independent samples of a residual that is more than noise.
 FEWEST_OF_RESIDUAL = 10.0
+# Precision of an unknown that cannot move, in its own.
+HELD = 1e9
 # Largest exponent: exp(500) is still far from overflow.
 LARGEST_EXPONENT = 500.0
 LOG_2, LOG_2PI = float(np.log(2.0)), float(np.log(2.0 * np.pi))
@@ -168,6 +171,22 @@ class Expansion:
         return cho_factor(self.information + np.diag(self.precision), lower=True)
 
     @cached_property
+    def is_pushed(self) -> NDArray[np.bool_]:
+        """Which unknowns rest at an end of their range and would leave it, were it wider, (n_unknowns,)."""
+        z, n = self.fit.z[self.kept], int(self.kept.sum())
+        step, pushed = self.gradient[:n], np.zeros(len(self.precision), dtype=np.bool_)
+        pushed[:n] = ((z <= AT_BOUND) & (step < 0.0)) | ((z >= 1.0 - AT_BOUND) & (step > 0.0))
+        return pushed
+
+    @cached_property
+    def factor_of_steps(self) -> tuple[Array, bool]:
+        """The factor of what may move: what is pushed against its end cannot make up for anything else."""
+        if not self.is_pushed.any():
+            return self.factor
+        held = np.where(self.is_pushed, HELD * (np.diag(self.information) + self.precision), 0.0)
+        return cho_factor(self.information + np.diag(self.precision + held), lower=True)
+
+    @cached_property
     def covariance(self) -> Array:
         """Posterior covariance of all unknowns, (n, n)."""
         return self.scale.variance(self.fit.chi2) * cho_solve(self.factor, np.eye(len(self.precision)))
@@ -178,7 +197,7 @@ class Expansion:
         columns: (n, n_samples). Both results: (n_unknowns, n).
         """
         mixed = self.scale.weight * (columns @ self.unknowns).T
-        answer = cho_solve(self.factor, mixed)
+        answer = cho_solve(self.factor_of_steps, mixed)
         return mixed, answer
 
     def products(self, columns: Array) -> tuple[Array, Array, Array]:
