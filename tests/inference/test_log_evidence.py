@@ -33,7 +33,8 @@ def stub(residual):
     parameters = dict.fromkeys("ab", SimpleNamespace(null=None))
     none_known = (np.empty(0, dtype=np.int64), np.empty(0), np.empty(0))
     return SimpleNamespace(
-        n_free=2, z=np.full(2, 0.5), jacobian=JACOBIAN, columns=OTHERS, residual=residual, chi2=float(residual @ residual),
+        n_free=2, z=np.full(2, 0.5), jacobian=JACOBIAN, columns=OTHERS, residual=residual,
+        chi2=float(residual @ residual),
         values={"a": 0.5, "b": 0.5}, records=SimpleNamespace(space=space, rows=none_known, span=np.ones(2)),
         model=SimpleNamespace(parameters=parameters), others=(SimpleNamespace(value=0.0),),
     )  # fmt: skip
