@@ -221,7 +221,7 @@ def test_check_takes_a_campaign_and_tells_what_does_not_hold(run, refused, tmp_p
         ran = run("check", toml)
     assert ran.code == 1
     assert "far outside the declared range" in ran.err
-    assert "FAIL moves in synthetic_train.csv: simulated diverges" in ran.out
+    assert "FAIL moves in synthetic_train.csv: its simulation diverges" in ran.out
     toml.write_text(text.replace('# effects = ["viscous"]', 'effects = ["gas_heat_loss"]'))
     ran = run("check", toml)
     assert ran.code == 1

@@ -48,7 +48,7 @@ def test_at_the_estimate_it_is_the_information_there_and_what_moves_together_is_
     assert [p.name for p in one_stroke.profiles] == ["p0", "k", "eta3", "n"]
     assert not one_stroke.at_bound.any()
     told = sentence(one_stroke, "p0, eta3 and n move together")
-    assert "+0.42 % of n goes next to unseen with" in told
+    assert "+0.42 % of n together with" in told
     # p0 less and n more balance the arm alike
     assert "-0.14 % of p0" in told
 

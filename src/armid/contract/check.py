@@ -75,9 +75,10 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[C
         for replay in (one for record in campaign.records for one in ready_at(middle, record, model).each):
             signal = replay.signal(middle)[0]
             is_finite = bool(np.isfinite(signal).all())
-            size = f"up to {np.max(np.abs(signal)):.3g}" if is_finite else "diverges"
-            measured = f"{np.max(np.abs(replay.measured)):.3g} {replay.record.unit}"
-            text = f"simulated {size} with parameters in the middle of their ranges, measured up to {measured}"
+            size = f"simulated up to {np.max(np.abs(signal)):.3g}" if is_finite else "its simulation diverges"
+            text = f"{size} with parameters in the middle of their ranges, measured up to "
+            text += f"{np.max(np.abs(replay.measured)):.3g} {replay.record.unit}"
+            text += "" if is_finite else ": other ranges are expected, or equations that give a number there"
             yield ContractPoint(f"moves in {replay.name}", is_finite, text)
         yield from far_from_typical(campaign, model.plant)
         yield from plausible(data_issues(campaign, model, space))

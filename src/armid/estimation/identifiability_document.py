@@ -87,7 +87,7 @@ def answer_and_remarks(result: Mapping[str, Any]) -> tuple[tuple[str, ...], tupl
             by_others.append(name)
         else:
             bounded.append(f"{name} ({deviation})")
-    said = [f"Bounded on both sides at 95 %, with this standard deviation: {', '.join(bounded)}."] if bounded else []
+    said = [f"Bounded on both sides, with the standard deviation: {', '.join(bounded)}."] if bounded else []
     said += [f"Bounded by the limits of other parameters alone: {', '.join(by_others)}."] if by_others else []
     said += [f"Not bounded on both sides: {', '.join(unbounded)}."] if unbounded else []
     n = len(result["groups"])
@@ -243,8 +243,8 @@ def group_remark(examination: Examination, group: Group) -> str:
         moves.append(f"{'+' if change >= 0.0 else '-'}{deviation_text(name, entries[name], abs(change))} of {name}")
     followers = listed(moves[:leader] + moves[leader + 1 :])
     return (f"{listed(group.names)} move together (collinearity index {group.index:.3g}): a change of one is made up "
-            f"for by the others to within {100 / group.index:.2g} %; {moves[leader]} goes next to unseen with "
-            f"{followers}.")  # fmt: skip
+            f"for by the others to within {100 / group.index:.2g} %; {moves[leader]} together with {followers} is "
+            "hardly seen.")  # fmt: skip
 
 
 def profile_remark(examination: Examination, profile: Profile) -> str:

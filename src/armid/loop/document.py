@@ -172,7 +172,8 @@ def answer(report: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, 
     parameters = report["parameters"]["after"]
     sure = [f"{name} = {value_text(p)}" for name, p in parameters.items() if p["trusted"]]
     exact = report["taken_as_exact"]
-    names = ", ".join(exact[:MOST_EXACT]) + (f" and {len(exact) - MOST_EXACT} more" if exact[MOST_EXACT:] else "")
+    others = len(exact) - MOST_EXACT
+    names = f"{', '.join(exact[:MOST_EXACT])} and {others} others" if others > 1 else ", ".join(exact)
     given = f", with {names} taken as exact (no tolerance is declared)" if exact else ""
     texts = [f"To be trusted{given}: {', '.join(sure)}."] if sure else []
     also = [VERDICTS[word].lower() for word in report["also"]]
@@ -266,7 +267,7 @@ def parameter_table(report: Mapping[str, Any]) -> Table:
 
 
 def trust_text(p: Mapping[str, Any]) -> str:
-    return "yes" if p["trusted"] else "not identified" if p["low"] is None else "no"
+    return "yes" if p["trusted"] else "fixed" if p["low"] is None else "no"
 
 
 def text_of_noise_alone(p: Mapping[str, Any]) -> str:
