@@ -260,7 +260,7 @@ def parameter_table(report: Mapping[str, Any]) -> Table:
              value_text(before[name], struck=True) if name in before else "") for name, p in after.items()]  # fmt: skip
     note = (
         "95 % intervals count all models that were fitted; those of noise alone, which `identify` gives too, take the "
-        "model in force as true. Struck through (~ ~): do not rely on it, as a discrepancy remains, or the value rests "
+        "model in force as true. Struck through (~ ~): do not rely on it, as something is missing, or the value rests "
         "at its bound."
     )
     return table("Parameters", ["parameter", "after", "of noise alone", "trusted", "before"], rows, note)

@@ -31,7 +31,7 @@ from armid.report.result import LOOP, Kind, Result
 from armid.units import behind, shown
 
 # Doubts for which an interval does not hold.
-REMAINS, HELD = "a significant discrepancy remains", "it rests at its bound"
+REMAINS, ACTS, HELD = "a significant discrepancy remains", "something unknown acts", "it rests at its bound"
 # A shape that armid sets free by itself, such as the width of a sign: nobody needs to widen its range.
 SEARCHED = "it lies at the end of the range that was searched"
 NOT_IDENTIFIED = "it was not identified: its value is declared"
@@ -106,7 +106,7 @@ class Estimate:
     @property
     def interval_holds(self) -> bool:
         """Whether there is an interval, and nothing speaks against it."""
-        return self.low is not None and not {REMAINS, HELD} & set(self.doubts)
+        return self.low is not None and not {REMAINS, ACTS, HELD} & set(self.doubts)
 
     @property
     def entry(self) -> dict[str, Any]:
@@ -270,7 +270,7 @@ def estimates(
         seen = [(cause if " " in cause or cause == "noise" else f"whether {cause} acts", share)
                 for cause, share in one.causes[:MOST_CAUSES] if round(share, 2)]  # fmt: skip
         causes = tuple(f"{cause}, {share:.0%}" for cause, share in seen)
-        doubts = [REMAINS] if discrepancy and (model != inference.in_force or is_unknown) else []
+        doubts = ([ACTS] if is_unknown else [REMAINS] if model != inference.in_force else []) if discrepancy else []
         if owner is not None and inference.posterior.probability("effect", owner.public) < CLAIMED:
             doubts.append(f"{owner.public} is not certain")
         if held[space.free_names.index(name)]:
