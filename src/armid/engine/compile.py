@@ -275,20 +275,25 @@ def load_module(parts: KernelParts) -> ModuleType:
     return module
 
 
+NO_NUMBER = "it does not return a number in every case"
+
+
 def compile_error(error: Exception) -> ArmidError:
     # numba writes in bold where colorama is installed
     text, equation = re.sub(r"\x1b\[[\d;]*m", "", str(error)), re.compile(r"(?:\bdef |<function )f__(\w+)")
     match = equation.search(text) or equation.search(definition_above(error))
     name = f"the equation '{match[1].replace('__scalar', '').replace('__', '.')}'" if match else "an equation"
-    return ArmidError(f"{name} cannot be compiled ({cause(text)}): numpy, math, numbers and plain functions of numbers "
-                      "are expected")  # fmt: skip
+    why = cause(text)
+    expected = "numpy, math, numbers and plain functions of numbers are"
+    expected = "a number from each of its branches is" if why == NO_NUMBER else expected
+    return ArmidError(f"{name} cannot be compiled ({why}): {expected} expected")
 
 
 def cause(text: str) -> str:
     """Return the one line of numba's message that says most."""
     call = re.search(r"^ *>>> (.+)$", text, re.MULTILINE)
     if call and re.search(r"with_lane\(.*(Optional|none)", call[1]):
-        return "it does not return a number in every case"
+        return NO_NUMBER
     if call:
         return f"numba has no {re.sub(r'lanes[0-9]+', 'float64', call[1])}"
     lines = [line.strip() for line in text.splitlines() if line.strip() and not line.startswith("Failed in")]
