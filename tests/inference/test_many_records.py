@@ -17,7 +17,8 @@ FEW = ("coulomb", "viscous", "drive_gain")
 
 
 def campaign(folder, noise, count):
-    """Eight records of an axis with dry friction, at rest first; count: the step of the sensor."""
+    """Eight records of an axis with dry friction, at rest first; count: the step of the sensor, of all or of each."""
+    counts = np.broadcast_to(count, 8)
     rng, tables = np.random.default_rng(61), {}
     for i in range(8):
         force = np.where(np.arange(N) < REST, 0.0, np.repeat(rng.normal(0.0, 15.0, N // 10), 10))
@@ -27,7 +28,7 @@ def campaign(folder, noise, count):
                 after = now + STEP_S / 50 * f / MASS
                 now = np.sign(after) * max(abs(after) - STEP_S / 50 * FRICTION / MASS, 0.0)
             speed.append(now)
-        measured = np.round((speed + noise * rng.standard_normal(N)) / count) * count
+        measured = np.round((speed + noise * rng.standard_normal(N)) / counts[i]) * counts[i]
         tables[f"r{i}.csv"] = {"time_s": STEP_S * np.arange(N), "velocity_m_s": measured, "drive_N": force}
     return read_campaign(write_records(folder, HEAD, tables, holdout=0))
 
@@ -43,6 +44,17 @@ def test_data_of_some_records_have_the_noise_that_all_have(tmp_path):
     signals = [np.random.default_rng(i).standard_normal((2, r.n_samples)) for i, r in enumerate(whole.each)]
     parts = whole.by_record(whole.white(signals))
     assert np.array_equal(some.white([signals[i] for i in own]), np.concatenate([parts[i] for i in own], axis=-1))
+
+
+def test_a_coarse_record_has_a_noise_of_its_own(tmp_path):
+    """Of its rest a coarse sensor shows next to nothing; steps that noise hides tell no sensors apart."""
+    coarse = 0.1
+    mixed = campaign(tmp_path, 0.02, [1e-4, 1e-4, coarse, 1e-4, 2e-4, 1e-4, 1e-4, 1e-4])
+    levels = [level.rms for level in whitened(mixed.train, mixed.plant).levels]
+    assert levels[2] == pytest.approx(np.hypot(0.02, coarse / np.sqrt(12.0)), rel=0.2)
+    fine = [*levels[:2], *levels[3:]]
+    assert fine == [fine[0]] * 7
+    assert fine[0] == pytest.approx(0.02, rel=0.1)
 
 
 @pytest.mark.slow

@@ -147,9 +147,10 @@ def noise_levels(records: Sequence[Record], plant: Plant, others: Sequence[Recor
 def sensor_of(record: Record) -> SensorKey:
     """Return output, sampling interval and step of a record: its noise is that of all records with the same.
 
-    The step to three digits, as far as two records tell the same.
+    A step that other noise hides tells no sensors apart; others to three digits, as far as two records tell the same.
     """
-    return record.output, record.manoeuvre.interval, f"{record.signals[0].sensor.step:.3g}"
+    step = record.signals[0].sensor.step
+    return record.output, record.manoeuvre.interval, f"{step if step > record.noise.rms else 0.0:.3g}"
 
 
 def by_sensor(records: Sequence[Record], values: Sequence[T]) -> dict[SensorKey, list[T]]:
