@@ -275,7 +275,7 @@ def load_module(parts: KernelParts) -> ModuleType:
     return module
 
 
-NO_NUMBER = "it does not return a number in every case"
+NO_NUMBER_IN_A_BRANCH = "it does not return a number in every case"
 
 
 def compile_error(error: Exception) -> ArmidError:
@@ -285,7 +285,7 @@ def compile_error(error: Exception) -> ArmidError:
     name = f"the equation '{match[1].replace('__scalar', '').replace('__', '.')}'" if match else "an equation"
     why = cause(text)
     expected = "numpy, math, numbers and plain functions of numbers are"
-    expected = "a number from each of its branches is" if why == NO_NUMBER else expected
+    expected = "a number from each of its branches is" if why == NO_NUMBER_IN_A_BRANCH else expected
     return ArmidError(f"{name} cannot be compiled ({why}): {expected} expected")
 
 
@@ -293,7 +293,7 @@ def cause(text: str) -> str:
     """Return the one line of numba's message that says most."""
     call = re.search(r"^ *>>> (.+)$", text, re.MULTILINE)
     if call and re.search(r"with_lane\(.*(Optional|none)", call[1]):
-        return NO_NUMBER
+        return NO_NUMBER_IN_A_BRANCH
     if call:
         return f"numba has no {re.sub(r'lanes[0-9]+', 'float64', call[1])}"
     lines = [line.strip() for line in text.splitlines() if line.strip() and not line.startswith("Failed in")]

@@ -41,7 +41,7 @@ WRONG_TOLERANCE = 3.0
 # Fewest independent samples of a residual that is more than noise.
 FEWEST_OF_RESIDUAL = 10.0
 # Precision of an unknown that cannot move, in its own.
-HELD = 1e9
+IMMOVABLE = 1e9
 # Largest exponent: exp(500) is still far from overflow.
 LARGEST_EXPONENT = 500.0
 LOG_2, LOG_2PI = float(np.log(2.0)), float(np.log(2.0 * np.pi))
@@ -183,7 +183,7 @@ class Expansion:
         """The factor of what may move: what is pushed against its end cannot make up for anything else."""
         if not self.is_pushed.any():
             return self.factor
-        held = np.where(self.is_pushed, HELD * (np.diag(self.information) + self.precision), 0.0)
+        held = np.where(self.is_pushed, IMMOVABLE * (np.diag(self.information) + self.precision), 0.0)
         return cho_factor(self.information + np.diag(self.precision + held), lower=True)
 
     @cached_property
