@@ -47,18 +47,18 @@ def test_at_the_estimate_it_is_the_information_there_and_what_moves_together_is_
     assert np.abs(expected.step).max() < 0.05
     assert [p.name for p in one_stroke.profiles] == ["p0", "k", "eta3", "n"]
     assert not one_stroke.at_bound.any()
-    told = sentence(one_stroke, "p0, eta3 and n move together")
-    assert "+0.42 % of n together with" in told
+    remark = sentence(one_stroke, "p0, eta3 and n move together")
+    assert "+0.42 % of n together with" in remark
     # p0 less and n more balance the arm alike
-    assert "-0.14 % of p0" in told
+    assert "-0.14 % of p0" in remark
 
 
 def test_an_effect_that_is_not_there_is_below_a_bound_and_its_profile_is_drawn(lowering, arm):
     model = arm + EFFECTS["coulomb"]
     with_friction = examine(lowering, model, space_of(model))
     profile = with_friction.profiles[4]
-    told = sentence(with_friction, "coulomb.level may be null")
-    assert "it is below" in told
+    remark = sentence(with_friction, "coulomb.level may be null")
+    assert "it is below" in remark
     profile = with_friction.profiles[4]
     assert profile.bounded == (False, True)
     assert profile_text(result_of(with_friction)["parameters"]["coulomb.level"]["profile"], 1.0).startswith("box 0")

@@ -1,4 +1,4 @@
-"""Long campaigns: some of the records are looked at first, and what leads there is fitted to all."""
+"""Long campaigns: some of the records are searched first, and the models that lead there are fitted to all."""
 
 from types import SimpleNamespace
 
@@ -47,7 +47,7 @@ def test_data_of_some_records_have_the_noise_that_all_have(tmp_path):
 
 
 def test_a_coarse_record_has_a_noise_of_its_own(tmp_path):
-    """Of its rest a coarse sensor shows next to nothing; steps that noise hides tell no sensors apart."""
+    """At rest a coarse sensor shows nearly no noise. Steps below the noise do not separate sensors."""
     coarse = 0.1
     mixed = campaign(tmp_path, 0.02, [1e-4, 1e-4, coarse, 1e-4, 2e-4, 1e-4, 1e-4, 1e-4])
     levels = [level.rms for level in whitened(mixed.train, mixed.plant).levels]
@@ -62,9 +62,9 @@ def test_what_leads_on_some_records_is_fitted_to_all(tmp_path, monkeypatch):
     many = campaign(tmp_path, 0.01, 1e-4)
     data = whitened(many.train, many.plant)
     monkeypatch.setattr(search, "SAMPLES", data.n_simulated // 4)
-    said, effects = [], {n: EFFECTS[n] for n in FEW}
-    found = infer(*prepared(Model(many.plant), many, effects, told=said.append))
-    assert any(s.startswith("looking at 2 of 8 records") for s in said)
+    messages, effects = [], {n: EFFECTS[n] for n in FEW}
+    found = infer(*prepared(Model(many.plant), many, effects, told=messages.append))
+    assert any(m.startswith("looking at 2 of 8 records") for m in messages)
     assert found.exploration.is_led
     assert found.probabilities["effects"]["coulomb"] > 0.95
     best = found.exploration.fits[found.in_force]

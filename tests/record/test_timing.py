@@ -139,13 +139,13 @@ def test_what_jumps_with_a_held_input_jumps_where_the_input_does_on_the_grid():
     every, grid = np.ones(n, dtype=bool), timing.grid()
     held = onto_grid(voltage, times, timing, "zero")
     noise = 0.01 * rng.standard_normal(n)
-    current, data = moved_onto_grid(2.0 * (voltage - speed_at(times)) + noise, times, timing, every, [voltage])
+    current, data = moved_onto_grid(2.0 * (voltage - speed_at(times)) + noise, times, timing, every, [(voltage, held)])
     assert np.std((current - 2.0 * (held - speed_at(grid)))[data]) < 0.02
-    assert fed_through(2.0 * (voltage - speed_at(times)) + noise, every, [voltage])[0] == pytest.approx(2.0, abs=0.01)
-    speed, data = moved_onto_grid(speed_at(times) + noise, times, timing, every, [voltage])
+    assert fed_through(2.0 * (voltage - speed_at(times)) + noise, voltage[np.newaxis]) == pytest.approx(2.0, abs=0.01)
+    speed, data = moved_onto_grid(speed_at(times) + noise, times, timing, every, [(voltage, held)])
     alone, _ = moved_onto_grid(speed_at(times) + noise, times, timing, every)
     assert np.std((speed - alone)[data]) < 0.005
-    assert abs(fed_through(speed_at(times) + noise, every, [voltage])[0]) < 0.01
+    assert abs(fed_through(speed_at(times) + noise, voltage[np.newaxis])) < 0.01
 
 
 @pytest.mark.parametrize(("times", "found"), [

@@ -284,8 +284,8 @@ def compile_error(error: Exception) -> ArmidError:
     match = equation.search(text) or equation.search(definition_above(error))
     name = f"the equation '{match[1].replace('__scalar', '').replace('__', '.')}'" if match else "an equation"
     why = cause(text)
-    expected = "numpy, math, numbers and plain functions of numbers are"
-    expected = "a number from each of its branches is" if why == NO_NUMBER_IN_A_BRANCH else expected
+    is_open = why == NO_NUMBER_IN_A_BRANCH
+    expected = "a number from each branch is" if is_open else "numpy, math, numbers and plain functions of numbers are"
     return ArmidError(f"{name} cannot be compiled ({why}): {expected} expected")
 
 

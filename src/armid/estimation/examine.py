@@ -28,7 +28,7 @@ from armid.estimation.least_squares import (
     weighted_records,
     with_fitted_starts,
 )
-from armid.estimation.noise_model import Level, known_level, level_weights, levels_of
+from armid.estimation.noise_model import Level, level_weights, levels_of
 from armid.model import Array, Model
 from armid.problem.problem import Replay, replays
 from armid.problem.space import Space
@@ -186,7 +186,7 @@ def examine(
     minimum = records.values(z)
     at = minimum if x is None else start
     information = information_at(train, space, at, levels_of(train, space, at, noise), records.weights)
-    by_inputs = covariance_by_inputs(train, space, at, tuple(map(known_level, train)))
+    by_inputs = covariance_by_inputs(train, space, at)
     information = information.widened(by_inputs)
     weighed = WeightedRecords(train, space, level_weights(information.levels))
     z_at = weighed.shares(at)

@@ -87,12 +87,12 @@ def answer_and_remarks(result: Mapping[str, Any]) -> tuple[tuple[str, ...], tupl
             by_others.append(name)
         else:
             bounded.append(f"{name} ({deviation})")
-    said = [f"Bounded on both sides, with the standard deviation: {', '.join(bounded)}."] if bounded else []
-    said += [f"Bounded by the limits of other parameters alone: {', '.join(by_others)}."] if by_others else []
-    said += [f"Not bounded on both sides: {', '.join(unbounded)}."] if unbounded else []
+    texts = [f"Bounded on both sides, with the standard deviation: {', '.join(bounded)}."] if bounded else []
+    texts += [f"Bounded by the limits of other parameters alone: {', '.join(by_others)}."] if by_others else []
+    texts += [f"Not bounded on both sides: {', '.join(unbounded)}."] if unbounded else []
     n = len(result["groups"])
     *others, best = result["remarks"][n:]
-    return (" ".join(said) or "No parameter is free.", *result["remarks"][:n], best), tuple(others)
+    return (" ".join(texts) or "No parameter is free.", *result["remarks"][:n], best), tuple(others)
 
 
 def parameter_table(result: Mapping[str, Any]) -> Table:

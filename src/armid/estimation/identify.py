@@ -216,8 +216,7 @@ class Identification(Result):
     @cached_property
     def by_inputs(self) -> Array:
         """Covariance of the estimate by noise of the inputs, SI, (n_free, n_free)."""
-        levels = tuple(known_level(r) for r in self.train_replays)
-        return covariance_by_inputs(self.train_replays, self.space, self.candidate[self.space.free], levels)
+        return covariance_by_inputs(self.train_replays, self.space, self.candidate[self.space.free])
 
     @cached_property
     def uncertainty(self) -> Information:

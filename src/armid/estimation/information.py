@@ -10,7 +10,7 @@ from armid.engine import simulate
 from armid.errors import ArmidError
 from armid.estimation.input_noise import answers, pooled_noise
 from armid.estimation.least_squares import LEAST_DAMPING, LeastSquaresProblem, WeightedRecords, fit, step_in_box
-from armid.estimation.noise_model import Level, level_of, level_weights
+from armid.estimation.noise_model import Level, known_level, level_of, level_weights
 from armid.model import Array
 from armid.problem.problem import Replay, by_record, samples_of
 from armid.problem.space import Space
@@ -186,13 +186,13 @@ def start_changes(records: LeastSquaresProblem, z: Array, bent: bool = False) ->
                     yield change_of_piece(outputs, index, 0.5 * (above + below) - same)
 
 
-def covariance_by_inputs(replays: tuple[Replay, ...], space: Space, x: Array, levels: tuple[Level, ...]) -> Array:
+def covariance_by_inputs(replays: tuple[Replay, ...], space: Space, x: Array) -> Array:
     """Return the covariance of an estimate by noise of the inputs, SI, (n_free, n_free).
 
     To first order, with the starts that are fitted. 0 where all inputs are commands, and where what is left is too
     small to hold such noise: the inputs are then commands.
     """
-    noise = pooled_noise([ready.record for ready in by_record(replays)])
+    noise, levels = pooled_noise([ready.record for ready in by_record(replays)]), list(map(known_level, replays))
     if not noise or any(level.rms == 0.0 for level in levels):
         return np.zeros((len(x), len(x)))
     records = WeightedRecords(replays, space, tuple(1.0 / level.rms for level in levels))

@@ -147,7 +147,7 @@ def noise_levels(records: Sequence[Record], plant: Plant, others: Sequence[Recor
 def sensor_of(record: Record) -> SensorKey:
     """Return output, sampling interval and step of a record: its noise is that of all records with the same.
 
-    A step that other noise hides tells no sensors apart; others to three digits, as far as two records tell the same.
+    A step below the noise counts as 0. Larger ones are compared to three digits, as two records may not show more.
     """
     step = record.signals[0].sensor.step
     return record.output, record.manoeuvre.interval, f"{step if step > record.noise.rms else 0.0:.3g}"

@@ -22,7 +22,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.special import log_ndtr, logsumexp
 
 from armid.estimation.constants import NAMED
-from armid.estimation.least_squares import AT_BOUND
+from armid.estimation.least_squares import held_by_bound
 from armid.inference.candidates import EffectKey
 from armid.inference.checks import is_significant
 from armid.inference.decisions import OUT_OF_TOLERANCE
@@ -40,7 +40,7 @@ USUAL_STRENGTH = 0.525
 WRONG_TOLERANCE = 3.0
 # Fewest independent samples of a residual that is more than noise.
 FEWEST_OF_RESIDUAL = 10.0
-# Precision of an unknown that cannot move, in its own.
+# By which factor an unknown that must not move is more precise than the records make it: rounding stays far below 1.
 IMMOVABLE = 1e9
 # Largest exponent: exp(500) is still far from overflow.
 LARGEST_EXPONENT = 500.0
@@ -173,14 +173,13 @@ class Expansion:
     @cached_property
     def is_pushed(self) -> NDArray[np.bool_]:
         """Which unknowns rest at an end of their range and would leave it, were it wider, (n_unknowns,)."""
-        z, n = self.fit.z[self.kept], int(self.kept.sum())
-        step, pushed = self.gradient[:n], np.zeros(len(self.precision), dtype=np.bool_)
-        pushed[:n] = ((z <= AT_BOUND) & (step < 0.0)) | ((z >= 1.0 - AT_BOUND) & (step > 0.0))
-        return pushed
+        at_end = held_by_bound(self.fit.records.space, self.fit.x)[self.kept]
+        outwards = self.gradient[: at_end.size] * (self.fit.z[self.kept] - 0.5) > 0.0
+        return np.append(at_end & outwards, np.zeros(len(self.precision) - at_end.size, dtype=np.bool_))
 
     @cached_property
     def factor_of_steps(self) -> tuple[Array, bool]:
-        """The factor of what may move: what is pushed against its end cannot make up for anything else."""
+        """The factor for steps, in which an unknown that is pushed against its end does not move."""
         if not self.is_pushed.any():
             return self.factor
         held = np.where(self.is_pushed, IMMOVABLE * (np.diag(self.information) + self.precision), 0.0)

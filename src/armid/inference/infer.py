@@ -35,7 +35,7 @@ from armid.inference.kinds.effects import least_waves
 from armid.inference.kinds.hypothesis import Hypotheses, Hypothesis
 from armid.inference.kinds.same_law import doubles
 from armid.inference.library import Library, library_of
-from armid.inference.model import Fit, accurate, fit_from, start_of, unless_diverged
+from armid.inference.model import Fit, unless_diverged, with_data_of
 from armid.inference.moves import Exploration, simpler
 from armid.inference.posterior import CONSTANTS_TEXT, Posterior, posterior, spread
 from armid.inference.search import explore, without_denied
@@ -379,8 +379,7 @@ def is_likelier(fit: Fit, inference: Inference) -> bool:
 
 def fitted_to(library: Library, fit: Fit, inference: Inference) -> Fit:
     """Return a model of an inference fitted to other data of the same records, constants and faults free."""
-    problem = library.problem(fit.active, fit.values)
-    again = accurate(fit_from(problem, fit.active, [start_of(problem, fit.values)]), library)
+    again = with_data_of(fit, library)
     if not fit.others:
         return again
     return freed(again, again.records, [f.unknown for f in fit.others], inference.exploration.scale().weight)

@@ -200,6 +200,12 @@ def fit_from(
     return Fit(tuple(active), records, z, records.plain.residuals(z)[0])
 
 
+def with_data_of(fit: Fit, library: Library) -> Fit:
+    """Return the model of a fit fitted to the data of a library, from where it stands, its constants as declared."""
+    records = library.problem(fit.active, fit.values)
+    return accurate(fit_from(records, fit.active, [start_of(records, fit.values)]), library)
+
+
 def accurate_enough(fit: Fit) -> Fit:
     """Return a fit about its own starts whose records are simulated as accurately as their noise asks for."""
     records = fit.records

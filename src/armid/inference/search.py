@@ -2,11 +2,11 @@
 
 Occam's window (Madigan, Raftery 1994, doi:10.1080/01621459.1994.10476894): models whose posterior is far below that
 of the best are not expanded. Leading forecasts are then fitted, because a forecast only ranks. Of many long records
-some are looked at first: what leads there is fitted to all, and is where the search on all of them begins.
+some are searched first. The models that lead there are fitted to all records, and the search on these begins at them.
 """
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from weakref import WeakKeyDictionary
@@ -22,7 +22,7 @@ from armid.inference.evidence import expansion_of, forecast
 from armid.inference.kinds import drifts, effects, faults, unknown
 from armid.inference.kinds.hypothesis import Hypotheses, Hypothesis, Proposal, may_join, words
 from armid.inference.library import Library
-from armid.inference.model import Fit, accurate, finished, fit_from, start_of, unless_diverged, with_free_shapes
+from armid.inference.model import Fit, finished, unless_diverged, with_data_of, with_free_shapes
 from armid.inference.model import freed as freed_shape
 from armid.inference.moves import (
     Exploration,
@@ -51,7 +51,7 @@ N_BESIDE, N_SIGNALS = 2, 2
 # Models that are expanded in all, and effects of one model.
 MOST_EXPANDED, MOST_EFFECTS = 16, 8
 # Above so many samples fewer models are expanded, but at least so many; so many constants within tolerances halve the
-# number. Of three times as many samples and more some records are looked at first, with about so many samples.
+# number. From three times as many samples on, some of the records are searched first, with about so many samples.
 SAMPLES, SPARED, FEWEST_EXPANDED, USUAL_CONSTANTS = 4_000, 3, 8, 10
 # Steps between samples; an expansion with more counts as several: friction as sharp as a fast machine shows it.
 USUAL_STEPS = 16.0
@@ -147,9 +147,9 @@ def look(exploration: Exploration) -> None:
 
 
 def take_from_some_records(exploration: Exploration) -> None:
-    """Take the models that lead on some of many long records; where there are not so many, look at all.
+    """Take the models that lead on some of many long records; look at all records where there are not so many.
 
-    Their faults are left to the search on all records, which can tell a fault from an effect.
+    Faults of records are left to the search on all records, which separates a fault from an effect.
     """
     library = exploration.library
     which = some_records(library.data)
@@ -165,11 +165,9 @@ def take_from_some_records(exploration: Exploration) -> None:
     leaders: dict[Hypotheses, Fit] = {}
     for model, _ in some.ranked():
         leaders.setdefault(frozenset(h for h in model if h.kind == "effect"), some.fits[model])
-    carried = [m for m in leaders if m][:BEAM]
-    again = library.each(lambda m: unless_diverged(partial(carried_on, leaders[m], library)), carried)
-    for model, fit in zip(carried, again, strict=True):
-        exploration.take(model, fit and with_constants(fit, exploration.constants, exploration.scale().weight))
-    exploration.is_led = bool(carried)
+    leaders.pop(frozenset(), None)
+    take_carried(exploration, dict(list(leaders.items())[:BEAM]), with_data_of)
+    exploration.is_led = bool(leaders)
 
 
 def some_records(data: WhitenedData) -> list[int] | None:
@@ -179,15 +177,19 @@ def some_records(data: WhitenedData) -> list[int] | None:
     return None if SPARED * n_some > n else [(2 * i + 1) * n // (2 * n_some) for i in range(n_some)]
 
 
-def carried_on(fit: Fit, library: Library) -> Fit:
-    """Return a fit to some records carried on to all, its constants as declared."""
-    problem = library.problem(fit.active, fit.values)
-    return accurate(fit_from(problem, fit.active, [start_of(problem, fit.values)]), library)
+def take_carried(
+    exploration: Exploration, leaders: Mapping[Hypotheses, Fit], carry: Callable[[Fit, Library], Fit]
+) -> None:  # fmt: skip
+    """Take models that lead on a part of the records, carried on to all of them, the constants freed there."""
+    library = exploration.library
+    carried = library.each(lambda fit: unless_diverged(partial(carry, fit, library)), leaders.values())
+    for model, fit in zip(leaders, carried, strict=True):
+        exploration.take(model, fit and with_constants(fit, exploration.constants, exploration.scale().weight))
 
 
 def take_from_short_pieces(exploration: Exploration) -> None:
     """Take the models that lead on short pieces of the records, carried on to the whole ones: see `shooting`."""
-    library, constants = exploration.library, exploration.constants
+    library = exploration.library
     begin = on_short_pieces(library, exploration.declared)
     if begin is None:
         return
@@ -195,10 +197,7 @@ def take_from_short_pieces(exploration: Exploration) -> None:
     short = begun(*begin)
     expand_all(short, FEWEST_EXPANDED)
     leaders = [m for m, _ in short.ranked() if m and all(h.kind == "effect" for h in m)][:BEAM]
-    again = library.each(lambda m: unless_diverged(partial(on_whole_records, short.fits[m], library)), leaders)
-    for model, fit in zip(leaders, again, strict=True):
-        weight = exploration.scale().weight
-        exploration.take(model, fit and with_constants(fit, constants, weight))
+    take_carried(exploration, {m: short.fits[m] for m in leaders}, on_whole_records)
 
 
 def fit_what_counts(exploration: Exploration) -> bool:
@@ -277,8 +276,8 @@ def next_model(exploration: Exploration) -> Hypotheses | None:
     """Return the model that is to be expanded next, None where all in the window are.
 
     Where the best model leaves more than noise, the best effect-only models of each size up to its own may lead on as
-    well: a strong second effect can mislead the choice of the first. Far from the noise these come first (a beam). They
-    do so on some of the records, where these are looked at first.
+    well: a strong second effect can mislead the choice of the first. Far from the noise these come first (a beam).
+    Where some records were searched first, the beam was expanded there.
     """
     ranked = exploration.ranked()
     best, top = ranked[0]

@@ -14,6 +14,7 @@ from armid.errors import ArmidError, nearest, quoted
 from armid.model import Array, Manoeuvre, ManoeuvreKey, Plant
 from armid.record.record import Piece, Record, RecordWarning, Signal
 from armid.record.resample import (
+    Held,
     Timing,
     check_number,
     gap_samples,
@@ -87,15 +88,15 @@ def record_of(table: CsvTable, sheet: RecordSheet, campaign: CampaignSheet, plan
     driven = {i.name: table.numbers(sources[i.name]) * input_factor(sources[i.name], i.unit, table)
               for i in plant.inputs if i.name in sources}  # fmt: skip
     most_lost = campaign.most_lost if sheet.most_lost is None else sheet.most_lost
-    held = [driven[i.name] for i in plant.inputs if i.name in driven and (i.hold or hold) == "zero"]
+    inputs = {i.name: onto_grid(driven[i.name], times, timing, i.hold or hold) if i.name in driven
+              else np.full(timing.n_samples, i.default) for i in plant.inputs}  # fmt: skip
+    held = [(driven[i.name], inputs[i.name]) for i in plant.inputs if i.name in driven and (i.hold or hold) == "zero"]
     read = partial(signal_of, table, times, timing, list(driven.values()), held, campaign.unwrap, most_lost)
     measured = [read(header, o.factors[header], o.unit, o.name) for o, header in outputs.items()]
     if campaign.gyro_range_deg_s is not None:
         check_range(measured, campaign.gyro_range_deg_s, table)
     others = {name: values for name, values in table.columns.items() if name not in (TIME_HEADER, *outputs.values())}
     columns = {name: onto_grid(values, times, timing) for name, values in others.items() if np.isfinite(values).all()}
-    inputs = {i.name: onto_grid(driven[i.name], times, timing, i.hold or hold) if i.name in driven
-              else np.full(timing.n_samples, i.default) for i in plant.inputs}  # fmt: skip
     constants = record_constants(plant, campaign.constants, sheet, where)
     noises = {name: noise_of_input(u, [(y, s.is_speed) for s, y in measured]).on_finer_grid(timing.finer)
               for name, u in driven.items()}  # fmt: skip
@@ -119,14 +120,14 @@ def record_of(table: CsvTable, sheet: RecordSheet, campaign: CampaignSheet, plan
 
 
 def signal_of(
-    table: CsvTable, times: Array, timing: Timing, inputs: Sequence[Array], held: Sequence[Array], unwrap: bool,
+    table: CsvTable, times: Array, timing: Timing, inputs: Sequence[Array], held: Sequence[Held], unwrap: bool,
     most_lost: float, header: str, factor: float, unit: str, output: str = "",
 ) -> tuple[Signal, Array]:  # fmt: skip
     """Return the signal of a column of a file, and the column, SI, (n_rows,); warn of what of it is not data.
 
-    inputs: the columns that drive the machine, (n_rows,) each; held: those that keep each value. unwrap: whether whole
-    turns are taken out. most_lost: share of the samples that may be no data. factor: to the SI unit, NaN for counts.
-    output: whose signal it is, which has to show a motion; "" for one that serves a start alone.
+    inputs: the columns that drive the machine, (n_rows,) each; held: those that keep each value, also on the grid.
+    unwrap: whether whole turns are taken out. most_lost: share of the samples that may be no data. factor: to the SI
+    unit, NaN for counts. output: whose signal it is, which has to show a motion; "" for one that serves a start alone.
     Raises ArmidError for a column with too few numbers or too many that are no data.
     """
     raw, is_speed = table.numbers(header, gaps=True), unit in ("rad/s", "m/s")

@@ -24,6 +24,8 @@ NEAR_SAMPLE = 0.75
 # what drives the machine may change at each row.
 OFF_GRID, MOST_FOR_A_ROW = 0.08, 4
 NEIGHBOURS = 7
+# A held input as in the rows of a file, (n_rows,), and on the grid, (n_samples,).
+Held = tuple[Array, Array]
 
 
 class IrregularSamplingWarning(RecordWarning):
@@ -194,20 +196,21 @@ def onto_grid(values: Array, times: Array, timing: Timing, hold: str = "linear")
 
 
 def moved_onto_grid(
-    values: Array, times: Array, timing: Timing, rows: Mask, held: Sequence[Array] = ()
+    values: Array, times: Array, timing: Timing, rows: Mask, held: Sequence[Held] = ()
 ) -> tuple[Array, Mask]:  # fmt: skip
     """Return a noisy column on the even grid and which of its samples were measured, both (n_samples,).
 
     Each grid sample takes the nearest row, moved along a parabola through 7 neighbours: the noise stays that of one
     sample and white, where a line between two rows would take a third off its variance and correlate neighbours. Where
-    no row of data is near, a straight line runs between those around. What jumps with a held input is not moved: it
-    jumps where the input does on the grid.
-    values, times, rows (which are data), held (columns of inputs): (n_rows,).
+    no row of data is near, a straight line runs between those around. The part that follows a held input at once is not
+    moved: it jumps where the input jumps on the grid.
+    values, times, rows (which are data): (n_rows,). held: inputs, each as in the rows and on the grid.
     """
     if timing.resampled and held:
-        share = fed_through(values, rows, held)
-        smooth, data = moved_onto_grid(values - share @ np.array(held), times, timing, rows)
-        return smooth + share @ np.array([onto_grid(u, times, timing, "zero") for u in held]), data
+        in_rows, on_grid = (np.array(u) for u in zip(*held, strict=True))
+        share = fed_through(values[rows], in_rows[:, rows])
+        smooth, data = moved_onto_grid(values - share @ in_rows, times, timing, rows)
+        return smooth + share @ on_grid, data
     known = values if rows.all() else np.where(rows, values, np.interp(times, times[rows], values[rows]))
     if not timing.resampled:
         return np.ascontiguousarray(known[timing.first :]), rows[timing.first :].copy()
@@ -226,18 +229,15 @@ def moved_onto_grid(
     return np.where(gap, np.interp(grid, times, known), moved), data
 
 
-def fed_through(values: Array, rows: Mask, held: Sequence[Array]) -> Array:
-    """Return by how much a column changes at once with each of some held inputs, (n_inputs,).
+def fed_through(y: Array, u: Array) -> Array:
+    """Return by how much a column y, (n_rows,), changes at once with each held input u, (n_inputs, n_rows).
 
-    Least squares of y_k = b u_k + c u_(k-1) + d u_(k-2) + e y_(k-1) + f y_(k-2) + g over the rows that are data.
+    Least squares of y_k = b u_k + c u_(k-1) + d u_(k-2) + e y_(k-1) + f y_(k-2) + g.
     """
-    y, u = values[rows], np.array(held)[:, rows]
-    known = np.vstack(
-        [u[:, 2:], u[:, 1:-1], u[:, :-2], y[np.newaxis, 1:-1], y[np.newaxis, :-2], np.ones((1, y.size - 2))]
-    )
+    known = np.vstack([u[:, 2:], u[:, 1:-1], u[:, :-2], y[1:-1], y[:-2], np.ones(y.size - 2)])
     sizes = np.maximum(np.max(np.abs(known), axis=1), 1e-300)
     solution, *_ = np.linalg.lstsq((known / sizes[:, np.newaxis]).T, y[2:], rcond=None)
-    return np.asarray(solution[: len(held)] / sizes[: len(held)])
+    return np.asarray(solution[: len(u)] / sizes[: len(u)])
 
 
 def gap_samples(times: Array, timing: Timing) -> Mask:
