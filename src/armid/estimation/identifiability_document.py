@@ -140,7 +140,8 @@ def offer_table(result: Mapping[str, Any]) -> Table:
     some = "" if names == every else f", {len(names)} of {len(every)} parameters"
     repeats = [offer for offer in offers[MOST_OFFERS:] if " once more" in offer["words"]][:1]
     entries = {name: result["parameters"][name] for name in names}
-    rows = [("none", *(deviation_text(name, p, p["deviation"]) for name, p in entries.items()), 1.0)]
+    before = {name: offers[0]["deviation"][name]["before"] if offers else p["deviation"] for name, p in entries.items()}
+    rows = [("none", *(deviation_text(name, p, before[name]) for name, p in entries.items()), 1.0)]
     for offer in (*offers[:MOST_OFFERS], *repeats):
         cells = [deviation_text(name, p, offer["deviation"][name]["after"]) for name, p in entries.items()]
         rows.append((offer["words"], *cells, offer["gain"]))
@@ -314,7 +315,9 @@ def offer_text(examination: Examination, offer: Offer) -> str:
     if after == UNDETERMINED:
         return (f"No further record that this machine can make determines {name}: fix it, or one of those that move "
                 "with it.")  # fmt: skip
-    return f"One more record, {offer.feasible.name}: {name} from {before} to {after}."
+    widened = examination.information.deviation[offer.best] > WIDENS * offer.before[offer.best]
+    alone = " (by noise of the sensors alone)" if widened else ""
+    return f"One more record, {offer.feasible.name}: {name} from {before} to {after}{alone}."
 
 
 CURVE, QUADRATIC, LIMIT = OKABE_ITO["blue"], OKABE_ITO["vermilion"], OKABE_ITO["black"]
