@@ -19,7 +19,7 @@ from armid.record import RecordWarning, read_campaign, write_table
 from armid.record.sensor import noise_of
 from armid.record.table import read_table
 from changed_records import trimmed
-from synthetic import write_records
+from synthetic import wheel, write_records
 
 pytestmark = pytest.mark.slow
 ARM = PLANTS["shell_transfer_arm"]
@@ -146,6 +146,27 @@ def test_a_large_change_in_one_record_is_undone_as_a_motion_answers_to_it(tmp_pa
     assert suspect["high"] - suspect["low"] < 1e-4
     for estimate in (e for e in found.after.estimates if e.name in truth):
         assert estimate.low < truth[estimate.name] < estimate.high
+
+
+def test_a_record_that_is_late_by_a_part_of_a_sample_bends_where_its_input_jumps(tmp_path):
+    """Between samples nobody knows a speed that bends: the input comes later, by its mean over each interval."""
+    rng, late, fine, tables = np.random.default_rng(62), 0.0037, 0.0001, {}
+    for file in ("a.csv", "b.csv", "c.csv", "d.csv"):
+        current = np.repeat(rng.uniform(-3.0, 3.0, 40), 20) * (np.arange(800) > 40)
+        speed, _ = wheel(np.repeat(current, 100), fine, 25.0, 1.5)
+        shown = speed[np.maximum(100 * np.arange(800) - (round(late / fine) if file == "b.csv" else 0), 0)]
+        tables[file] = {"time_s": 0.01 * np.arange(800), "current_A": current,
+                        "angular_velocity_rad_s": shown + 0.02 * rng.standard_normal(800)}  # fmt: skip
+    head = 'name = "wheel"\nplant = "rotary_arm"\nhold = "zero"\n[parameters.gravity_moment]\nfixed = 0.0\n'
+    head += "[parameters.gain]\nfixed = 0.25\n"
+    there = read_campaign(write_records(tmp_path / "wheel", head, tables))
+    found = close_loop(there.model(), there, {n: EFFECTS[n] for n in ("coulomb", "drive_lag", "drive_delay")})
+    assert (found.verdict, found.also, found.steps) == ("record_disagrees", (), ())
+    (suspect,) = report_of(found)["suspects"]
+    assert (suspect["record"], suspect["kind"]) == ("b.csv", "late")
+    assert suspect["value"] == pytest.approx(late, abs=5e-5)
+    values = {e.name: e.value for e in found.after.estimates}
+    assert (values["inertia"], values["damping"]) == pytest.approx((0.01, 0.015), rel=1e-3)
 
 
 def test_a_parameter_that_is_another_in_one_record_is_told(stand, campaign):

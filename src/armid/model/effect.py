@@ -10,7 +10,7 @@ from armid.model.parameter import Parameter, check_name
 Equation = Callable[..., Any]
 # How the nodes of a composed model begin: an effect of this name would look like them.
 RESERVED_WORDS = ("rate", "initial", "guard")
-SIGN_WIDTH = Parameter("width", "speed", 0.0005, 0.05, fixed=0.005, note="speed over which the sign is smoothed")
+SIGN_WIDTH = Parameter("width", "speed", 0.00005, 0.05, fixed=0.005, note="speed over which the sign is smoothed")
 SIZE_WIDTH = replace(SIGN_WIDTH, note="speed over which the size of speed is smoothed")
 
 

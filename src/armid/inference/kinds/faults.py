@@ -43,12 +43,14 @@ FAULT_STEP = 1e-3
 class Fault:
     """Name what may be wrong in a file: a kind, and of a start or a label the constant of the record that is.
 
-    alone: whether one sensor of several is late, and not the file.
+    alone: whether one sensor of several is late, and not the file. driven: whether a signal bends where a held input
+    jumps, so that between samples nobody knows it. Then signals are moved by whole samples, and inputs by the rest.
     """
 
     kind: str
     constant: str = ""
     alone: bool = False
+    driven: bool = False
 
     @property
     def of_sensor(self) -> bool:
@@ -103,9 +105,14 @@ class Fault:
     def places(self, record: Record, value: float) -> Array:
         """Return where in its samples a record holds those of its true times, (n_samples,)."""
         own = np.arange(record.measured.size, dtype=np.float64)
-        return own + value / record.manoeuvre.interval if self.kind == "late" else own * (1.0 + value)
+        if self.kind == "clock":
+            return own * (1.0 + value)
+        late = value / record.manoeuvre.interval
+        return own + (np.floor(late) if self.driven else late)
 
     def undone_piece(self, piece: Piece, value: float, plant: Plant, output: str) -> Piece:
+        if self.driven:
+            return piece.with_later_inputs(float(value / piece.manoeuvre.interval % 1.0))
         if self.kind in ("offset", "gain"):
             return self.with_sound_start(piece, value, plant, output) if piece.shown_start else piece
         if not self.constant:
@@ -172,11 +179,24 @@ def faults_of(base: WhiteRecords, index: int) -> Iterator[Fault]:
         yield Fault("late", alone=True)
     if index != of_file(base, index)[0]:
         return
-    yield from (Fault(kind) for kind in OF_TIMES)
+    yield Fault("late", driven=is_driven(base, index))
+    yield Fault("clock")
     keys = [key for key in model.plant.keys if key.constant in record.constants]
     starts = {name for node in model.graph.of_kind("initial") for name in leaves_of(model, node.key)}
     yield from (Fault("start", key.constant) for key in keys if key.constant in starts and not key.boolean)
     yield from (Fault("label", key.constant) for key in keys if key.boolean)
+
+
+def is_driven(base: WhiteRecords, index: int) -> bool:
+    """Tell whether held inputs drive the rate of what a sensor of a file reads, and none reads an input at once."""
+    model, record = base.model, base.data.each[index]
+    inputs = {i.name for i in model.plant.inputs}
+    held = all((i.hold or record.manoeuvre.hold) == "zero" for i in model.plant.inputs)
+    read = set[str]().union(*(leaves_of(model, model.plant.outputs[base.replays[i].place].signal)
+                              for i in of_file(base, index)))  # fmt: skip
+    states = (key for key in read if model.graph.nodes[key].kind == "state")
+    rates = set[str]().union(*(leaves_of(model, f"rate__{key}") for key in states))
+    return held and bool(rates & inputs) and not read & inputs
 
 
 def leaves_of(model: Model, key: str) -> set[str]:
