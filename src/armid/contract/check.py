@@ -12,7 +12,7 @@ from armid.contract.trials import ContractPoint
 from armid.engine import accuracy_against, calibrate
 from armid.errors import ArmidError
 from armid.estimation.corrections import DataIssue
-from armid.estimation.data_checks import data_issues
+from armid.estimation.data_checks import data_issues, with_room
 from armid.identifiers import Identifier, as_identifier
 from armid.identifiers.own import global_generators
 from armid.model import PLANTS, Array, Effect, Model, Plant
@@ -64,7 +64,7 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[C
         yield ContractPoint(f"{record.file}, {record.role}", True, f"{text} (from {noise.source}){unused}")
     try:
         model = campaign.model(effects)
-        space = space_of(model, campaign.parameters)
+        space = with_room(campaign, model, space_of(model, campaign.parameters))
         free = ", ".join(space.free_names) or "nothing"
         yield ContractPoint("model", True, f"{model.plant.name} with {len(model.effects)} effects, free: {free}")
         if campaign.taken_as_exact:

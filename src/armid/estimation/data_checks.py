@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from armid.engine import Calibration, Schedule, probes
 from armid.estimation.corrections import WIDER_BOUNDS, Correction, DataIssue, corrections, of_pieces, rms
-from armid.estimation.least_squares import WeightedRecords, descend, with_fitted_starts
+from armid.estimation.least_squares import WeightedRecords, descend, held_by_bound, with_fitted_starts
 from armid.model import Array, Manoeuvre, Model, Plant
 from armid.model.parameter import powers_of
 from armid.problem.problem import ReadyRecord, by_record
@@ -112,6 +112,24 @@ def data_issues(campaign: Campaign, model: Model, space: Space) -> tuple[DataIss
     issues += () if issues else begun_elsewhere(trial, train, z)
     files = {s.record for s in issues if s.kind == "time"}
     return (*seen, *(s for s in times if not files & {"", s.record}), *issues)
+
+
+def with_room(campaign: Campaign, model: Model, space: Space, given: Iterable[str] = ()) -> Space:
+    """Return the space with ranges eight times as wide of those strengths that a rough fit holds at their end.
+
+    The range of an effect's strength in the machine's scales is a size to expect, and no wall: what a motor's voltage
+    brakes at full speed is all that it drives. One that the campaign or the user gave (given: names) stays.
+    """
+    sized = {n for n in sized_parameters(model) if "." in n} & set(space.free_names)
+    sized -= {*campaign.parameters, *given}
+    if not sized:
+        return space
+    train = [shortened(filled(r), len(campaign.train)) for r in campaign.train]
+    trial = DataTrial(model, space)
+    train = [trial.thinned(r, len(train)) for r in train]
+    values = trial.problem(train).values(trial.fit(train)[0])
+    held = np.array(space.free_names)[held_by_bound(space, values) & (values != 0.0)].tolist()
+    return space.with_wider(sized & set(held))
 
 
 def filled(record: Record) -> Record:
