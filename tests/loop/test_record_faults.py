@@ -169,6 +169,34 @@ def test_a_record_that_is_late_by_a_part_of_a_sample_bends_where_its_input_jumps
     assert (values["inertia"], values["damping"]) == pytest.approx((0.01, 0.015), rel=1e-3)
 
 
+@pytest.mark.parametrize(("given", "found_as"), [
+    ("gain]\nfixed = 0.4", ("gain", "u", "")),
+    ("gain]\nlow = 0.1\nhigh = 1.0\n[parameters.inertia]\nfixed = 0.02", ("parameter", "", "gain")),
+])  # fmt: skip
+def test_an_input_that_acts_stronger_is_one_fault_and_not_one_of_each_sensor(tmp_path, given, found_as):
+    """Where a parameter does the same, it is told as that parameter."""
+    rng, times, tables = np.random.default_rng(9), 0.004 * np.arange(800), {}
+    for file in ("a.csv", "b.csv", "c.csv", "d.csv"):
+        current = np.repeat(rng.uniform(-0.3, 0.3, 32), 25) * (times > 0.4)
+        tables[file] = {"time_s": times, "current_A": current, "angle_rad": np.cumsum(current),
+                        "angular_velocity_rad_s": np.cumsum(current)}  # fmt: skip
+    head = f'name = "joint"\nplant = "rotary_arm"\nhold = "zero"\n[parameters.{given}\n'
+    truth = {"inertia": 0.02, "gravity_moment": 0.06, "damping": 0.012, "gain": 0.4}
+    made = read_campaign(write_records(tmp_path / "made", head, tables))
+    for file, table in tables.items():
+        own = truth | {"gain": 0.42 if file == "c.csv" else 0.4}
+        motion = armid.simulate(made, parameters=own).tables[file]
+        for column, noise in (("angle_rad", 5e-4), ("angular_velocity_rad_s", 5e-3)):
+            table[column] = motion[column] + noise * rng.standard_normal(len(times))
+    there = read_campaign(write_records(tmp_path / "seen", head, tables))
+    found = close_loop(there.model(), there, {n: EFFECTS[n] for n in ("coulomb", "position_spring")})
+    assert (found.verdict, found.also, found.steps) == ("record_disagrees", (), ())
+    (suspect,) = report_of(found)["suspects"]
+    assert (suspect["record"], suspect["kind"], suspect["output"], suspect["parameter"]) == ("c.csv", *found_as)
+    size = 0.05 if suspect["kind"] == "gain" else 0.02
+    assert suspect["low"] < size < suspect["high"] < 1.03 * size
+
+
 def test_a_parameter_that_is_another_in_one_record_is_told(stand, campaign):
     options = list(COMMON)
     options[options.index("--p0") + 1] = repr(1.03 * TRUTH["p0"])

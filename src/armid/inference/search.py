@@ -322,7 +322,8 @@ def expand(exploration: Exploration, model: Hypotheses) -> None:
     library.say(f"expanding {words(model) if model else 'the declared model'}")
     about, held = expansion_of(fit, scale, library), expansion_of(fit, scale, library, with_doubts=False)
     proposals: list[Proposal] = effects.propose(fit, exploration.known, library)
-    others = [*faults.propose(fit, exploration.faults, library), *drifts.propose(fit, exploration.drifts)]
+    changes = drifts.propose(fit, exploration.drifts)
+    others = [*faults.propose(fit, exploration.faults, library, changes), *changes]
     others = [p for p in others if may_join(model, p.hypothesis, len(fit.records.data.records))]
     ahead = [forecast(about, p) for p in proposals]
     ahead_held = [forecast(held, p) for p in proposals]

@@ -60,8 +60,9 @@ class RecordFault:
     declared), "parameter" (by how much it is larger in this record than in the others), "trend" (of all records: by
     how much it is larger in this one, the last, than in the first), or of samples "gap", "clipped", "stuck", "spikes".
     value, low, high: size with its 95 % interval [unit]; from_s, to_s: where it is [s]; None where there is no such
-    thing. action: "freed" (undone) or "left_out" (of samples). output: whose sensor it is, "" where the plant has but
-    one, and of the whole file. parameter: what is another, or has the trend, then others that do as well; "" for other
+    thing. action: "freed" (undone) or "left_out" (of samples). output: whose sensor it is, or the input whose gain it
+    is, "" where the plant has but one output, and of the whole file. parameter: what is another, or has the trend, then
+    others that do as well; "" for other
     kinds.
     """
 
@@ -409,7 +410,7 @@ def fault_of(hypothesis: Hypothesis, fit: Fit, inference: Inference) -> RecordFa
     if fault.kind == "label":
         constant = record.constants[fault.constant]
         return RecordFault(record.file, record.role, "label", FREED, 1.0 - constant, fault.unit(record, plant))
-    output = record.output if fault.of_sensor and len(plant.outputs) > 1 else ""
+    output = fault.input or (record.output if fault.of_sensor and len(plant.outputs) > 1 else "")
     size = size_of(hypothesis, what.largest, fault.unit(record, plant), fit, inference)
     return RecordFault(record.file, record.role, fault.kind, FREED, *size, output=output)
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from armid.inference.decisions import MOVES, calibration
 from armid.inference.evidence import Expansion, Forecast
 from armid.inference.kinds.hypothesis import Hypothesis, Proposal
+from armid.inference.kinds.same_law import SAME_LAW, apart
 from armid.inference.library import Library
 from armid.inference.model import Fit, fit_from, unless_diverged
 from armid.inference.unknowns import Unknown, freed, moved
@@ -45,16 +46,18 @@ class Fault:
 
     alone: whether one sensor of several is late, and not the file. driven: whether a signal bends where a held input
     jumps, so that between samples nobody knows it. Then signals are moved by whole samples, and inputs by the rest.
+    input: of a gain, the input that acts so much stronger than the file tells, "" for what a sensor shows.
     """
 
     kind: str
     constant: str = ""
     alone: bool = False
     driven: bool = False
+    input: str = ""
 
     @property
     def of_sensor(self) -> bool:
-        return self.alone or self.kind in OF_SENSOR
+        return self.alone or (self.kind in OF_SENSOR and not self.input)
 
     def largest(self, record: Record) -> float:
         of_signal = float(np.abs(record.measured).max()) if self.kind in ("offset", "drift") else 1.0
@@ -66,7 +69,7 @@ class Fault:
 
     def touches(self, output: str, other: str) -> bool:
         """Tell whether a fault of one output of a record is a fault of another too."""
-        return not self.of_sensor or other == output
+        return not self.input and (not self.of_sensor or other == output)
 
     def undone(self, record: Record, value: float, plant: Plant, output: str = "") -> Record:
         """Return a record without the fault; output: whose sensor it is, "" for the first."""
@@ -95,7 +98,7 @@ class Fault:
         Samples at the ends have no value. Between samples noise is smoothed. A smaller signal has less noise, whose
         density counts with twice the logarithm of the factor.
         """
-        if self.kind == "gain":
+        if self.kind == "gain" and not self.input:
             return 2.0 * record.measured.size * float(np.log(abs(1.0 + value)))
         if self.kind not in OF_TIMES:
             return 0.0
@@ -113,6 +116,8 @@ class Fault:
     def undone_piece(self, piece: Piece, value: float, plant: Plant, output: str) -> Piece:
         if self.driven:
             return piece.with_later_inputs(float(value / piece.manoeuvre.interval % 1.0))
+        if self.input:
+            return piece.with_inputs({self.input: (1.0 + value) * piece.manoeuvre.inputs[self.input]})
         if self.kind in ("offset", "gain"):
             return self.with_sound_start(piece, value, plant, output) if piece.shown_start else piece
         if not self.constant:
@@ -181,6 +186,8 @@ def faults_of(base: WhiteRecords, index: int) -> Iterator[Fault]:
         return
     yield Fault("late", driven=is_driven(base, index))
     yield Fault("clock")
+    # of one output the gain of its sensor does nearly the same
+    yield from (Fault("gain", input=i.name) for i in model.plant.inputs if len(of_file(base, index)) > 1)
     keys = [key for key in model.plant.keys if key.constant in record.constants]
     starts = {name for node in model.graph.of_kind("initial") for name in leaves_of(model, node.key)}
     yield from (Fault("start", key.constant) for key in keys if key.constant in starts and not key.boolean)
@@ -335,19 +342,28 @@ def hypotheses(records: WhiteRecords) -> list[Hypothesis]:
     for index, record in enumerate(records.data.each):
         for fault in faults_of(records, index):
             largest = 1.0 if fault.kind == "label" else fault.largest(record)
-            file, output = record.file, record.output if fault.of_sensor else ""
-            place = f"{file}:{output}" if fault.of_sensor else file
+            file, column = record.file, record.output if fault.of_sensor else fault.input
+            place = f"{file}:{column}" if fault.of_sensor or fault.input else file
             name = f"{fault.kind}{'_' if fault.constant else ''}{fault.constant}@{place}"
-            faults.append((name, OfRecord(index, fault, largest), (file, output)))
+            faults.append((name, OfRecord(index, fault, largest), (file, column)))
     odds = calibration().log_odds("record", len(faults))
     return [Hypothesis("record", name, "", odds, what, of) for name, what, of in faults]
 
 
-def propose(fit: Fit, known: list[Hypothesis], library: Library) -> list[Proposal]:
-    """Return the faults of records that a fit does not hold, with what the largest plausible size does."""
+def propose(fit: Fit, known: list[Hypothesis], library: Library, changes: Sequence[Proposal] = ()) -> list[Proposal]:
+    """Return the faults of records that a fit does not hold, with what the largest plausible size does.
+
+    changes: of parameters. One in the same record may be what an input does there, and then stands for it.
+    """
     held = {f.unknown.name for f in fit.others}
-    return [p for p in library.each(lambda h: proposal(fit, h), [h for h in known if h.name not in held])
-            if p is not None]  # fmt: skip
+    found = library.each(lambda h: proposal(fit, h), [h for h in known if h.name not in held])
+
+    def is_change(p: Proposal) -> bool:
+        file, own = p.hypothesis.record[0], p.columns[0]
+        others = (c.columns[0] for c in changes if c.hypothesis.record[0] == file)
+        return bool(p.hypothesis.means.fault.input) and any(apart(own, other) < SAME_LAW for other in others)
+
+    return [p for p in found if p is not None and not is_change(p)]
 
 
 def proposal(fit: Fit, hypothesis: Hypothesis) -> Proposal | None:
