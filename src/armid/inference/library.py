@@ -87,7 +87,7 @@ class Library:
     own_shapes_free: bool = False
     _models: dict[Active, Model] = field(default_factory=dict)
     _problems: dict[frozenset[EffectKey], WhiteRecords] = field(default_factory=dict)
-    _schedules: dict[EffectKey, "Schedules"] = field(default_factory=dict)
+    _schedules: dict[tuple[EffectKey, Model], "Schedules"] = field(default_factory=dict)
 
     def joinable(self, active: Active) -> list[EffectKey]:
         there = {other.public for other in active}
@@ -131,26 +131,29 @@ class Library:
         """Return the least-squares problem of the declared model with some candidates, on all train records.
 
         near: values about which the engine is calibrated when the problem is asked for first; a box may reach to
-        masses a thousand times too light, which would ask for steps that nothing else needs. Where each candidate was
-        calibrated alone, with the same compiled model, the finest of the schedules found there serves from then on.
+        masses a thousand times too light, which would ask for steps that nothing else needs. Each candidate is
+        calibrated alone, once with each compiled model; the finest of the schedules found there serves several.
         """
         key = frozenset(active)
         if key not in self._problems:
             model = self.compiled_model(active)
-            space = self.space(model, active)
-            known = [self._schedules.get(k.declared) for k in active]
-            alone = [s for s in known if s is not None and s.serves(model, self.misfit)]
-            if active and len(alone) == len(active):
-                replays = scheduled_replays(self.data.records, model, alone)
-            else:
+            if active:
                 # What is tried needs no more than that; what is found good is calibrated anew (`recalibrated`).
-                replays = self.replays(model, space, near or {}, self.misfit, on_one=bool(active))
-            if len(active) == 1:
-                self._schedules[active[0].declared] = Schedules(
-                    model, self.misfit, {r.record.file: r.calibrations for r in replays}
-                )
-            self._problems[key] = WhiteRecords(replays, space, self.data, self.known)
+                known = [self.schedules(k, model, near or {}) for k in active]
+                replays = scheduled_replays(self.data.records, model, known)
+            else:
+                replays = self.replays(model, self.space(model, active), near or {}, self.misfit)
+            self._problems[key] = WhiteRecords(replays, self.space(model, active), self.data, self.known)
         return self._problems[key]
+
+    def schedules(self, key: EffectKey, model: Model, near: Mapping[str, float]) -> "Schedules":
+        """Return how finely a candidate alone is simulated with a compiled model."""
+        known = self._schedules.get((key.declared, model))
+        if known is None or not known.serves(self.misfit):
+            replays = self.replays(model, self.space(model, (key,)), near, self.misfit, on_one=True)
+            known = Schedules(self.misfit, {r.record.file: r.calibrations for r in replays})
+            self._schedules[key.declared, model] = known
+        return known
 
     def about(self, replays: Sequence[Replay]) -> "Library":
         """Return the library whose records in motion start where others do; itself where no start is fitted."""
@@ -309,12 +312,11 @@ class Library:
 class Schedules:
     """Hold how finely a candidate alone is simulated on each file, found for a misfit."""
 
-    model: Model
     misfit: float
     by_file: Mapping[str, tuple[Calibration, ...]]
 
-    def serves(self, model: Model, misfit: float) -> bool:
-        return self.model is model and self.misfit <= FURTHER_ERROR * misfit
+    def serves(self, misfit: float) -> bool:
+        return self.misfit <= FURTHER_ERROR * misfit
 
 
 def scheduled_replays(records: Sequence[Record], model: Model, known: Sequence[Schedules]) -> tuple[Replay, ...]:

@@ -171,9 +171,12 @@ def take_from_some_records(exploration: Exploration) -> None:
 
 
 def some_records(data: WhitenedData) -> list[int] | None:
-    """Return which records are looked at first: every so many; None where that would spare little."""
+    """Return which records are looked at first: every so many; None where that would spare little.
+
+    A sensor that holds its value tells as much as it has samples, however many are simulated.
+    """
     n = len(data.records)
-    n_some = int(np.ceil(n * SAMPLES / data.n_simulated))
+    n_some = int(np.ceil(n * SAMPLES / len(data.sound)))
     return None if SPARED * n_some > n else [(2 * i + 1) * n // (2 * n_some) for i in range(n_some)]
 
 
