@@ -14,12 +14,12 @@ from armid.inference.kinds.faults import Fault
 from armid.loop import close_loop, report_of
 from armid.loop.document import conclusion
 from armid.loop.result import RecordFault, fault_sentence
-from armid.model import EFFECTS, PLANTS, Model
+from armid.model import EFFECTS, PLANTS, Constant, Input, Model, Output, Parameter, Plant, Scales, State
 from armid.record import RecordWarning, read_campaign, write_table
 from armid.record.sensor import noise_of
 from armid.record.table import read_table
 from changed_records import trimmed
-from synthetic import wheel, write_records
+from synthetic import moved, wheel, write_records
 
 pytestmark = pytest.mark.slow
 ARM = PLANTS["shell_transfer_arm"]
@@ -195,6 +195,52 @@ def test_an_input_that_acts_stronger_is_one_fault_and_not_one_of_each_sensor(tmp
     assert (suspect["record"], suspect["kind"], suspect["output"], suspect["parameter"]) == ("c.csv", *found_as)
     size = 0.05 if suspect["kind"] == "gain" else 0.02
     assert suspect["low"] < size < suspect["high"] < 1.03 * size
+
+
+def stage():
+    """Return a stage on springs: its position is read, and a current that follows the held voltage at once."""
+    return Plant(
+        name="stage", note="m dv/dt = k (u - k v) / R - c q",
+        parameters=(Parameter("mass", "kg", 0.05, 1.0), Parameter("stiffness", "N/m", 200.0, 5000.0),
+                    Parameter("force_constant", "N/A", 2.0, 20.0)),
+        states=(State("q", "m", lambda v: v, lambda start_position: start_position, "position_m"),
+                State("v", "m/s", lambda force_constant, current, stiffness, q, torque, mass:
+                      (force_constant * current - stiffness * q + torque) / mass,
+                      lambda start_speed: start_speed, "speed_m_s")),
+        quantities={"current": lambda u, force_constant, v: (u - force_constant * v) / 5.0,
+                    "shown": lambda q, encoder: q + encoder},
+        constants=(Constant("start_position", 0.0, "m", ""), Constant("start_speed", 0.0, "m/s", "")),
+        inputs=(Input("u", "V", ("u_V",), hold="zero"),), ports={"torque": "N", "encoder": "m"},
+        aliases={"omega": "v"}, scales=Scales(effort=15.0, speed=0.3, effort_unit="N", length_unit="m"), from_rest=False,
+        outputs=(Output("position", "shown", "m", port="encoder"), Output("current", "current", "A")),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("late", [0.0004, -0.0017])
+def test_a_late_record_whose_current_jumps_with_the_voltage(tmp_path, late):
+    """What follows an input at once is moved with it, as the other records tell."""
+    rng, fine, tables = np.random.default_rng(63), 20, {}
+    for file in ("a.csv", "b.csv", "c.csv", "d.csv"):
+        voltage = np.repeat(rng.uniform(-8.0, 8.0, 60), 20) * (np.arange(1200) > 100)
+
+        def rates(x, u):
+            return np.array([x[1], (8.0 * (u - 8.0 * x[1]) / 5.0 - 2000.0 * x[0]) / 0.25])
+
+        states = moved(rates, np.repeat(voltage, fine), 1e-3 / fine, (0.0, 0.0), "zero")
+        at = np.clip(fine * np.arange(1200) - (round(late * 1e3 * fine) if file == "b.csv" else 0), 0, len(states) - 1)
+        current = (np.repeat(voltage, fine)[at] - 8.0 * states[at, 1]) / 5.0
+        tables[file] = {"time_s": 1e-3 * np.arange(1200), "u_V": voltage,
+                        "position_mm": 1e3 * states[at, 0] + 2e-3 * rng.standard_normal(1200),
+                        "current_A": current + 0.01 * rng.standard_normal(1200)}  # fmt: skip
+    folder = write_records(tmp_path / "stage", 'name = "stage"\nplant = "stage"\n', tables)
+    there = read_campaign(folder, {"stage": stage()})
+    found = close_loop(there.model(), there, {n: EFFECTS[n] for n in ("coulomb", "position_spring")})
+    assert (found.verdict, found.also, found.steps) == ("record_disagrees", (), ())
+    (suspect,) = report_of(found)["suspects"]
+    assert (suspect["record"], suspect["kind"], suspect["output"]) == ("b.csv", "late", "")
+    assert suspect["value"] == pytest.approx(late, abs=5e-6)
+    for estimate, value in zip(found.after.estimates, (0.25, 2000.0, 8.0), strict=True):
+        assert estimate.value == pytest.approx(value, rel=2e-3)
 
 
 def test_a_parameter_that_is_another_in_one_record_is_told(stand, campaign):

@@ -5,7 +5,8 @@ import pytest
 
 from armid.errors import ArmidError
 from armid.record import IrregularSamplingWarning, read_campaign
-from armid.record.resample import fed_through, moved_onto_grid, onto_grid, timing_of
+from armid.model import Manoeuvre
+from armid.record.resample import moved_onto_grid, onto_grid, share_at_once, timing_of
 
 
 def motion(times):
@@ -101,6 +102,18 @@ def test_a_held_input_keeps_its_impulse():
     assert abs(late) < 0.01
 
 
+@pytest.mark.parametrize("part", [0.2, 0.5, 0.9])
+def test_a_held_input_comes_later_by_a_part_of_a_sample(part):
+    """A free mass has the right speed at the samples."""
+    values = np.repeat([0.0, 2.0, -1.0, 3.0], 5)
+    grid, fine = Manoeuvre(0.1, 20, {}, {"u": values}, "zero"), 1000
+    there = np.repeat(values, fine)[np.maximum(np.arange(20 * fine) - round(part * fine), 0)]
+    speed = np.append(0.0, np.cumsum(there))[::fine][:20] / fine
+    later = grid.later(part).inputs["u"]
+    np.testing.assert_allclose(np.append(0.0, np.cumsum(later))[:20], speed, atol=1e-9)
+    np.testing.assert_allclose(grid.later(1.0).inputs["u"][1:], values[:-1])
+
+
 def test_noise_stays_white_on_the_grid():
     """A line between two rows would take a third off its variance and correlate neighbours by a fifth and more."""
     rng = np.random.default_rng(7)
@@ -141,11 +154,11 @@ def test_what_jumps_with_a_held_input_jumps_where_the_input_does_on_the_grid():
     noise = 0.01 * rng.standard_normal(n)
     current, data = moved_onto_grid(2.0 * (voltage - speed_at(times)) + noise, times, timing, every, [(voltage, held)])
     assert np.std((current - 2.0 * (held - speed_at(grid)))[data]) < 0.02
-    assert fed_through(2.0 * (voltage - speed_at(times)) + noise, voltage[np.newaxis]) == pytest.approx(2.0, abs=0.01)
+    assert share_at_once([2.0 * (voltage - speed_at(times)) + noise], [voltage[np.newaxis]]) == pytest.approx(2.0, abs=0.01)
     speed, data = moved_onto_grid(speed_at(times) + noise, times, timing, every, [(voltage, held)])
     alone, _ = moved_onto_grid(speed_at(times) + noise, times, timing, every)
     assert np.std((speed - alone)[data]) < 0.005
-    assert abs(fed_through(speed_at(times) + noise, voltage[np.newaxis])) < 0.01
+    assert abs(share_at_once([speed_at(times) + noise], [voltage[np.newaxis]])) < 0.01
 
 
 @pytest.mark.parametrize(("times", "found"), [

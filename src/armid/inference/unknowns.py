@@ -141,15 +141,17 @@ def moved(records: WhiteRecords, unknowns: Sequence[Unknown], values: Sequence[f
 
 
 def freed(
-    fit: Fit, base: WhiteRecords, unknowns: Sequence[Unknown], weight: float, limit: float = np.inf, rough: bool = False
+    fit: Fit, base: WhiteRecords, unknowns: Sequence[Unknown], weight: float, limit: float = np.inf,
+    rough: bool = False, begun: Mapping[str, float] | None = None,
 ) -> Fit:  # fmt: skip
     """Return a fit with some unknowns freed, from where it stands: min weight |r|^2 + |v|^2.
 
     base: the records of the fit before any of the unknowns was moved. weight: of each square, see `evidence.Scale`.
-    limit: see `descend`. rough: to about where it arrives.
+    limit: see `descend`. rough: to about where it arrives. begun: where unknowns begin that the fit does not hold, in
+    prior deviations, else 0.
     Raises ArmidError where it diverges at its start.
     """
-    known = {f.unknown.name: f.value for f in fit.others}
+    known = {**(begun or {}), **{f.unknown.name: f.value for f in fit.others}}
     kept = {f.unknown.name: f.column for f in fit.others}
     values, z = np.array([known.get(u.name, 0.0) for u in unknowns]), fit.z
     (cost,), (residual,) = costs_at(base, unknowns, values[np.newaxis], z[np.newaxis], weight)

@@ -71,6 +71,19 @@ class Manoeuvre:
             before={name: values[sooner:first] for name, values in known.items()} if sooner < first else {},
         )  # fmt: skip
 
+    def later(self, part: float) -> "Manoeuvre":
+        """Return the manoeuvre with held inputs that come later by a part of a sample: their mean over each interval.
+
+        What they drive has the right speed at the samples. part: from 0 to 1. Before the record an input is as it was
+        last known, or as it begins.
+        """
+
+        def moved(name: str, values: Array) -> Array:
+            last = self.before[name][-1] if name in self.before else values[0]
+            return values - part * np.diff(values, prepend=last)
+
+        return replace(self, inputs={name: moved(name, values) for name, values in self.inputs.items()})
+
     def likeness(self) -> tuple[object, ...]:
         """Return what two manoeuvres have in common when a machine answers both alike, hashable; not the start time."""
         signals = [*sorted(self.inputs.items()), *sorted(self.before.items())]

@@ -108,15 +108,6 @@ class Piece:
         """Return the piece with other values of inputs, (n_samples,) each."""
         return replace(self, manoeuvre=replace(self.manoeuvre, inputs={**self.manoeuvre.inputs, **inputs}))
 
-    def with_later_inputs(self, part: float) -> "Piece":
-        """Return the piece with held inputs that come later by a part of a sample: their mean over each interval."""
-
-        def later(name: str, values: Array) -> Array:
-            last = self.manoeuvre.before.get(name, values)[-1 if name in self.manoeuvre.before else 0]
-            return values - part * np.diff(values, prepend=last)
-
-        return self.with_inputs({name: later(name, values) for name, values in self.manoeuvre.inputs.items()})
-
     def of(self, samples: NDArray[Any]) -> NDArray[Any]:
         """Return the samples of the piece out of those of the whole record."""
         return samples[self.start_index : self.start_index + self.manoeuvre.n_samples]

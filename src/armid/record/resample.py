@@ -208,7 +208,7 @@ def moved_onto_grid(
     """
     if timing.resampled and held:
         in_rows, on_grid = (np.array(u) for u in zip(*held, strict=True))
-        share = fed_through(values[rows], in_rows[:, rows])
+        share = share_at_once([values[rows]], [in_rows[:, rows]])
         smooth, data = moved_onto_grid(values - share @ in_rows, times, timing, rows)
         return smooth + share @ on_grid, data
     known = values if rows.all() else np.where(rows, values, np.interp(times, times[rows], values[rows]))
@@ -229,15 +229,19 @@ def moved_onto_grid(
     return np.where(gap, np.interp(grid, times, known), moved), data
 
 
-def fed_through(y: Array, u: Array) -> Array:
-    """Return by how much a column y, (n_rows,), changes at once with each held input u, (n_inputs, n_rows).
+def share_at_once(signals: Sequence[Array], inputs: Sequence[Array]) -> Array:
+    """Return by how much a signal changes at once with each held input, (n_inputs,), from some records.
 
-    Least squares of y_k = b u_k + c u_(k-1) + d u_(k-2) + e y_(k-1) + f y_(k-2) + g.
+    Least squares of y_k = b u_k + c u_(k-1) + d u_(k-2) + e y_(k-1) + f y_(k-2) + g. signals: each (n_rows,); inputs:
+    of each (n_inputs, n_rows).
     """
-    known = np.vstack([u[:, 2:], u[:, 1:-1], u[:, :-2], y[1:-1], y[:-2], np.ones(y.size - 2)])
+    known = np.hstack([np.vstack([u[:, 2:], u[:, 1:-1], u[:, :-2], y[1:-1], y[:-2], np.ones(y.size - 2)])
+                       for y, u in zip(signals, inputs, strict=True)])  # fmt: skip
     sizes = np.maximum(np.max(np.abs(known), axis=1), 1e-300)
-    solution, *_ = np.linalg.lstsq((known / sizes[:, np.newaxis]).T, y[2:], rcond=None)
-    return np.asarray(solution[: len(u)] / sizes[: len(u)])
+    wanted = np.concatenate([y[2:] for y in signals])
+    solution, *_ = np.linalg.lstsq((known / sizes[:, np.newaxis]).T, wanted, rcond=None)
+    n_inputs = len(inputs[0])
+    return np.asarray(solution[:n_inputs] / sizes[:n_inputs])
 
 
 def gap_samples(times: Array, timing: Timing) -> Mask:

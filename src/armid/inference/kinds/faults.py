@@ -4,7 +4,7 @@ Each is undone by a size; `column_of` gives what a unit of it does to the whiten
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
@@ -23,6 +23,7 @@ from armid.model import Array, Model, Plant
 from armid.problem.problem import ReadyRecord, Replay, signals_of, with_each
 from armid.problem.starts import with_shown_starts
 from armid.record import Piece, Record
+from armid.record.resample import share_at_once
 from armid.record.start import VisibleOutputs
 
 # Faults whose size is fitted: largest plausible one, in seconds, in shares of the largest signal (a drift per second),
@@ -36,6 +37,8 @@ SIDE_SAMPLES = 32
 DIGITS_OF_PLACE = 10
 # So few different weights are those of a late record.
 FEW_PLACES = 8
+# Part of a sample by which a sensor is read after an input changed, from which on it shows what the input was before.
+AT_ONCE = 0.05
 # Share of the largest plausible size over which differences are taken.
 FAULT_STEP = 1e-3
 
@@ -44,15 +47,17 @@ FAULT_STEP = 1e-3
 class Fault:
     """Name what may be wrong in a file: a kind, and of a start or a label the constant of the record that is.
 
-    alone: whether one sensor of several is late, and not the file. driven: whether a signal bends where a held input
-    jumps, so that between samples nobody knows it. Then signals are moved by whole samples, and inputs by the rest.
-    input: of a gain, the input that acts so much stronger than the file tells, "" for what a sensor shows.
+    alone: whether one sensor of several is late, and not the file. driven: whether a speed is read that bends where a
+    held input jumps, so that between samples nobody knows it. Then signals are moved by whole samples, and inputs by
+    the rest. fed: output -> by how much it follows each held input at once, for those that do. input: of a gain, the
+    input that acts so much stronger than the file tells, "" for what a sensor shows.
     """
 
     kind: str
     constant: str = ""
     alone: bool = False
     driven: bool = False
+    fed: Mapping[str, Array] = field(default_factory=dict)
     input: str = ""
 
     @property
@@ -113,9 +118,20 @@ class Fault:
         late = value / record.manoeuvre.interval
         return own + (np.floor(late) if self.driven else late)
 
+    def inputs_read(self, record: Record, value: float) -> tuple[Mapping[str, Array], Mapping[str, Array]]:
+        """Return held inputs as they were where a sensor read them, and as they are once the fault is undone.
+
+        A sample that is read a little after an input changed shows what the input then is.
+        """
+        grid = record.manoeuvre
+        late = value / grid.interval
+        own = np.arange(grid.n_samples) - int(np.ceil(late - AT_ONCE))
+        read = {name: u[np.clip(own, 0, u.size - 1)] for name, u in grid.inputs.items()}
+        return read, grid.later(late % 1.0).inputs if self.driven else grid.inputs
+
     def undone_piece(self, piece: Piece, value: float, plant: Plant, output: str) -> Piece:
         if self.driven:
-            return piece.with_later_inputs(float(value / piece.manoeuvre.interval % 1.0))
+            return replace(piece, manoeuvre=piece.manoeuvre.later(value / piece.manoeuvre.interval % 1.0))
         if self.input:
             return piece.with_inputs({self.input: (1.0 + value) * piece.manoeuvre.inputs[self.input]})
         if self.kind in ("offset", "gain"):
@@ -137,7 +153,11 @@ class Fault:
     def measured(self, record: Record, value: float) -> Array:
         """Return what was measured without the fault, (n_samples,)."""
         if self.kind in OF_TIMES:
-            return resampled(record.measured, self.places(record, value))
+            at_once = self.fed.get(record.output)
+            if at_once is None:
+                return resampled(record.measured, self.places(record, value))
+            read, then = (at_once @ np.array(list(inputs.values())) for inputs in self.inputs_read(record, value))
+            return resampled(record.measured - read, self.places(record, value)) + then
         if self.kind == "gain":
             return record.measured / (1.0 + value)
         if self.constant:
@@ -181,10 +201,10 @@ def faults_of(base: WhiteRecords, index: int) -> Iterator[Fault]:
     model, record = base.model, base.data.each[index]
     yield from (Fault(kind) for kind in OF_SENSOR)
     if len(of_file(base, index)) > 1:
-        yield Fault("late", alone=True)
+        yield Fault("late", alone=True, fed=fed_through(base, index))
     if index != of_file(base, index)[0]:
         return
-    yield Fault("late", driven=is_driven(base, index))
+    yield late_file(base, index)
     yield Fault("clock")
     # of one output the gain of its sensor does nearly the same
     yield from (Fault("gain", input=i.name) for i in model.plant.inputs if len(of_file(base, index)) > 1)
@@ -194,16 +214,34 @@ def faults_of(base: WhiteRecords, index: int) -> Iterator[Fault]:
     yield from (Fault("label", key.constant) for key in keys if key.boolean)
 
 
-def is_driven(base: WhiteRecords, index: int) -> bool:
-    """Tell whether held inputs drive the rate of what a sensor of a file reads, and none reads an input at once."""
-    model, record = base.model, base.data.each[index]
-    inputs = {i.name for i in model.plant.inputs}
-    held = all((i.hold or record.manoeuvre.hold) == "zero" for i in model.plant.inputs)
-    read = set[str]().union(*(leaves_of(model, model.plant.outputs[base.replays[i].place].signal)
-                              for i in of_file(base, index)))  # fmt: skip
-    states = (key for key in read if model.graph.nodes[key].kind == "state")
-    rates = set[str]().union(*(leaves_of(model, f"rate__{key}") for key in states))
-    return held and bool(rates & inputs) and not read & inputs
+def late_file(base: WhiteRecords, index: int) -> Fault:
+    """Return the fault of a late file, as held inputs drive what its sensors read."""
+    graph, inputs = base.model.graph, {i.name for i in base.model.plant.inputs}
+    read = [leaves_of(base.model, signal) for signal in signals_read(base, index).values()]
+    states = {key for leaves in read if leaves.isdisjoint(inputs) for key in leaves if graph.nodes[key].kind == "state"}
+    bends = any(not leaves_of(base.model, f"rate__{key}").isdisjoint(inputs) for key in states)
+    return Fault("late", driven=bends and holds_inputs(base, index), fed=fed_through(base, index))
+
+
+def holds_inputs(base: WhiteRecords, index: int) -> bool:
+    hold = base.data.each[index].manoeuvre.hold
+    return all((i.hold or hold) == "zero" for i in base.model.plant.inputs)
+
+
+def fed_through(base: WhiteRecords, index: int) -> dict[str, Array]:
+    """Return by how much outputs of a file that read held inputs at once follow these, as the other records tell."""
+    inputs, file = {i.name for i in base.model.plant.inputs}, base.data.each[index].file
+    outputs = [o for o, key in signals_read(base, index).items() if not leaves_of(base.model, key).isdisjoint(inputs)]
+    rows = {o: [r for r in base.data.each if r.output == o and r.file != file] for o in outputs}
+    return {o: share_at_once([r.measured for r in records],
+                             [np.array(list(r.manoeuvre.inputs.values())) for r in records])
+            for o, records in rows.items() if records and holds_inputs(base, index)}  # fmt: skip
+
+
+def signals_read(base: WhiteRecords, index: int) -> dict[str, str]:
+    """Return output -> key of what is read, of the outputs of a file."""
+    outputs = base.model.plant.outputs
+    return {base.data.each[i].output: outputs[base.replays[i].place].signal for i in of_file(base, index)}
 
 
 def leaves_of(model: Model, key: str) -> set[str]:
@@ -265,7 +303,7 @@ def simulated_file(
 def delayed(base: WhiteRecords, index: int, z: Array, fault: Fault) -> list[Array]:
     """Return by how much a unit of a fault of times changes the signals of a file.
 
-    From the simulated slope: that of the measured signal is mostly noise.
+    From the simulated slope: that of the measured signal is mostly noise. What follows an input at once has none.
     """
     changes = []
     for i, simulated in zip(of_file(base, index), simulated_file(base, index, z), strict=True):
@@ -276,7 +314,10 @@ def delayed(base: WhiteRecords, index: int, z: Array, fault: Fault) -> list[Arra
         step = record.manoeuvre.interval
         samples = np.concatenate([p.start_index + np.arange(p.manoeuvre.n_samples)[own]
                                   for p, own in zip(replay.pieces, replay.record.samples, strict=True)])  # fmt: skip
-        changes.append(-np.gradient(simulated[0], record.spacing) * (1.0 if fault.kind == "late" else step * samples))
+        smooth = simulated[0]
+        if record.output in fault.fed:
+            smooth = smooth - (fault.fed[record.output] @ np.array(list(record.manoeuvre.inputs.values())))[samples]
+        changes.append(-np.gradient(smooth, record.spacing) * (1.0 if fault.kind == "late" else step * samples))
     return changes
 
 
@@ -290,10 +331,29 @@ def column_of(base: WhiteRecords, index: int, z: Array, fault: Fault, value: flo
     return np.asarray(sides[1] - sides[0]) / (2.0 * step)
 
 
+def likely_shift(base: WhiteRecords, index: int, z: Array, fault: Fault) -> float:
+    """Return the shift in halves of a sample that makes a record likeliest as a fit simulates it [s].
+
+    Where a signal jumps its slope tells nothing.
+    """
+    inside, record = of_file(base, index), base.data.each[index]
+    step = record.manoeuvre.interval
+    most = min(int(fault.largest(record) / step), record.n_samples // 4)
+    simulated = [simulated_file(with_record(base, index, fault, part * step), index, z) for part in (0.0, 0.5)]
+
+    def cost(n: int) -> float:
+        there = with_record(base, index, fault, 0.5 * n * step).replays
+        left = [(there[i].measured - y[0])[most : len(y[0]) - most] / base.data.levels[i].rms
+                for i, y in zip(inside, simulated[n % 2], strict=True)]  # fmt: skip
+        return float(sum(np.mean(x**2) for x in left))
+
+    return 0.5 * step * min(range(-2 * most, 2 * most + 1), key=cost)
+
+
 def moved_by(base: WhiteRecords, index: int, z: Array, fault: Fault, value: float) -> float:
     """Return the rms by which a fault moves its record, of several outputs the most, in units of the noise there."""
     inside = of_file(base, index)
-    if fault.kind in OF_TIMES:
+    if fault.kind in OF_TIMES and not fault.fed:
         changes = [value * change for change in delayed(base, index, z, fault)]
     else:
         faulty = with_record(base, index, fault, value)
@@ -371,6 +431,10 @@ def proposal(fit: Fit, hypothesis: Hypothesis) -> Proposal | None:
     if what.fault.kind == "label":
         before, after = (r.plain.residuals(fit.z)[0] for r in (fit.records, what.moved(fit.records, 1.0)))
         column, scales = before - after, np.array([1.0])
+    elif what.fault.fed and (shift := likely_shift(fit.records, what.index, fit.z, what.fault)) != 0.0:
+        there = with_record(fit.records, what.index, what.fault, shift)
+        column = residual_of(fit.records, what.index, fit.z) - residual_of(there, what.index, fit.z)
+        column, scales = what.largest / shift * column, SCALES_OF_FAULT
     else:
         column = what.largest * column_of(fit.records, what.index, fit.z, what.fault, 0.0)
         scales = SCALES_OF_FAULT
@@ -386,7 +450,9 @@ def refit(hypothesis: Hypothesis, fit: Fit, about: Expansion, ahead: Forecast, l
     if what.fault.kind == "label":
         return unless_diverged(lambda: relabelled(fit, what, about.scale.weight, limit))
     unknowns = [*(f.unknown for f in fit.others), what.unknown(hypothesis.name, base)]
-    again = unless_diverged(lambda: freed(fit, base, unknowns, about.scale.weight, limit, rough=True))
+    best = np.unravel_index(int(np.argmax(ahead.log_factor)), ahead.log_factor.shape)
+    begun = {hypothesis.name: float(ahead.strength[best])} if what.fault.fed else None
+    again = unless_diverged(lambda: freed(fit, base, unknowns, about.scale.weight, limit, rough=True, begun=begun))
     if again is None:
         return None
     size = again.others[-1].value * what.largest
