@@ -159,6 +159,14 @@ class Owner:
         return -omega * level
 
 
+def always_raises(omega, level):
+    raise ValueError(omega)
+
+
+def misspelt(omega, level):
+    return omega * levle  # noqa: F821
+
+
 typed = {}
 exec("def typed_in(omega, level): return -omega * level", typed)
 
@@ -169,6 +177,9 @@ TOLD = {
     "object": (unknown_object, r"the equation unknown_object uses 'TABLE' \(dict\), which cannot be compiled: numpy"),
     "module": (lambda omega, level: random.random() * level, r"uses 'random' \(module\), which cannot be compiled"),
     "builtin": (lambda omega, level: sorted([omega, level]), "uses 'sorted', which cannot be compiled"),
+    "unknown name": (misspelt, "uses 'levle', which is neither an argument of it nor defined in its file: did you mean "
+                               "'level'"),
+    "raises": (always_raises, "the equation always_raises raises an error and returns nothing: a number is expected"),
     "no return": (nothing_returned, "the equation nothing_returned returns nothing: a number is expected"),
     "default": (odd_default, "the equation odd_default has the default {'a': 1.0}: a number is expected"),
     "no source": (typed["typed_in"], "the source of the equation typed_in cannot be read: define it in a file"),
@@ -178,6 +189,7 @@ TOLD = {
 COMPILED = {
     "arrays": (lambda omega, level: level * np.linalg.norm(omega),
                r"the equation 'bad.torque' cannot be compiled \(numba has no norm\(float64\)\): numpy"),
+    "several": (lambda omega, level: np.array([omega, level]), r"\(it returns several numbers\): one number is expected"),
     "import": (imports, r"the equation 'bad.torque' cannot be compiled \(numba: Use of unsupported opcode"),
     "None": (sometimes_nothing, r"the equation 'bad.torque' cannot be compiled \(it does not return a number in every"),
 }  # fmt: skip

@@ -155,8 +155,15 @@ def test_a_temperature_makes_evidence_weaker_names_count_without_unknown_signals
         Atom(0.0, 0.0, frozenset({("effect", n)}), np.array([m]), np.ones(1)) for n, m in (("a", 0.0), ("b", 9.0))
     )
     causes = dict(Posterior(atoms, ("p",)).causes("p", 1.0))
-    assert causes["noise"] == pytest.approx(1.0 / (1.0 + 4.5**2))
+    assert causes["noise"] == pytest.approx((2.0 * 1.96 / (9.0 + 2.0 * 1.645)) ** 2, rel=1e-3)
     assert sum(causes.values()) == pytest.approx(1.0)
+    # A rare model that hardly knows the parameter has most of the variance, and little of the interval.
+    atoms = tuple(Atom(e, 0.0, frozenset(names), np.zeros(1), np.array([d]))
+                  for e, names, d in ((0.0, (), 1.0), (np.log(0.005), (("effect", "b"),), 20.0)))  # fmt: skip
+    assert dict(Posterior(atoms, ("p",)).causes("p", 1.0))["noise"] > 0.9
+    atoms = tuple(
+        Atom(0.0, 0.0, frozenset({("effect", n)}), np.array([m]), np.ones(1)) for n, m in (("a", 0.0), ("b", 9.0))
+    )
     # one model is in force, and another, sharper one has nearly all of the weight
     atoms = (Atom(0.0, 0.0, frozenset(), np.zeros(1), np.array([0.1])), atoms[1])
     assert all(share <= 1.0 for share in dict(Posterior(atoms, ("p",)).causes("p", 30.0)).values())

@@ -211,7 +211,8 @@ def stage():
                     "shown": lambda q, encoder: q + encoder},
         constants=(Constant("start_position", 0.0, "m", ""), Constant("start_speed", 0.0, "m/s", "")),
         inputs=(Input("u", "V", ("u_V",), hold="zero"),), ports={"torque": "N", "encoder": "m"},
-        aliases={"omega": "v"}, scales=Scales(effort=15.0, speed=0.3, effort_unit="N", length_unit="m"), from_rest=False,
+        aliases={"omega": "v"}, from_rest=False,
+        scales=Scales(effort=15.0, speed=0.3, effort_unit="N", length_unit="m"),
         outputs=(Output("position", "shown", "m", port="encoder"), Output("current", "current", "A")),
     )  # fmt: skip
 

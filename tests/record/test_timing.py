@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from armid.errors import ArmidError
-from armid.record import IrregularSamplingWarning, read_campaign
 from armid.model import Manoeuvre
+from armid.record import IrregularSamplingWarning, read_campaign
 from armid.record.resample import moved_onto_grid, onto_grid, share_at_once, timing_of
 
 
@@ -154,7 +154,9 @@ def test_what_jumps_with_a_held_input_jumps_where_the_input_does_on_the_grid():
     noise = 0.01 * rng.standard_normal(n)
     current, data = moved_onto_grid(2.0 * (voltage - speed_at(times)) + noise, times, timing, every, [(voltage, held)])
     assert np.std((current - 2.0 * (held - speed_at(grid)))[data]) < 0.02
-    assert share_at_once([2.0 * (voltage - speed_at(times)) + noise], [voltage[np.newaxis]]) == pytest.approx(2.0, abs=0.01)
+    assert share_at_once([2.0 * (voltage - speed_at(times)) + noise], [voltage[np.newaxis]]) == pytest.approx(
+        2.0, abs=0.01
+    )
     speed, data = moved_onto_grid(speed_at(times) + noise, times, timing, every, [(voltage, held)])
     alone, _ = moved_onto_grid(speed_at(times) + noise, times, timing, every)
     assert np.std((speed - alone)[data]) < 0.005

@@ -276,6 +276,7 @@ def load_module(parts: KernelParts) -> ModuleType:
 
 
 NO_NUMBER_IN_A_BRANCH = "it does not return a number in every case"
+SEVERAL_NUMBERS = "it returns several numbers"
 
 
 def compile_error(error: Exception) -> ArmidError:
@@ -285,7 +286,13 @@ def compile_error(error: Exception) -> ArmidError:
     name = f"the equation '{match[1].replace('__scalar', '').replace('__', '.')}'" if match else "an equation"
     why = cause(text)
     is_open = why == NO_NUMBER_IN_A_BRANCH
-    expected = "a number from each branch is" if is_open else "numpy, math, numbers and plain functions of numbers are"
+    expected = (
+        "a number from each branch is"
+        if is_open
+        else "one number is"
+        if why == SEVERAL_NUMBERS
+        else "numpy, math, numbers and plain functions of numbers are"
+    )
     return ArmidError(f"{name} cannot be compiled ({why}): {expected} expected")
 
 
@@ -294,6 +301,8 @@ def cause(text: str) -> str:
     call = re.search(r"^ *>>> (.+)$", text, re.MULTILINE)
     if call and re.search(r"with_lane\(.*(Optional|none)", call[1]):
         return NO_NUMBER_IN_A_BRANCH
+    if call and re.search(r"with_lane\(.*(array|Tuple|list)\(", call[1]):
+        return SEVERAL_NUMBERS
     if call:
         return f"numba has no {re.sub(r'lanes[0-9]+', 'float64', call[1])}"
     lines = [line.strip() for line in text.splitlines() if line.strip() and not line.startswith("Failed in")]

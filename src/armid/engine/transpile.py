@@ -1,6 +1,7 @@
 """The source text of one plain function, made self-contained for the generated module."""
 
 import ast
+import builtins
 import inspect
 import math
 from collections.abc import Callable
@@ -13,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from armid.engine.simd_math import LANE_FUNCTIONS
-from armid.errors import ArmidError
+from armid.errors import ArmidError, nearest
 from armid.model.graph import definition_of
 
 # A name that no function can have; it becomes `np` when the names of the function are replaced.
@@ -198,8 +199,11 @@ class Names(ast.NodeTransformer):
         if node.id in ALLOWED_BUILTINS:
             self.is_scalar |= node.id in SCALAR_BUILTINS
             return node
-        raise ArmidError(f"the equation {self.function.__qualname__} uses '{node.id}', which cannot be compiled: "
-                         "numpy, math, numbers and plain functions are expected")  # fmt: skip
+        uses = f"the equation {self.function.__qualname__} uses '{node.id}'"
+        if not hasattr(builtins, node.id):
+            raise ArmidError(f"{uses}, which is neither an argument of it nor defined in its file: "
+                             f"{nearest(node.id, self.local)}")  # fmt: skip
+        raise ArmidError(f"{uses}, which cannot be compiled: numpy, math, numbers and plain functions are expected")
 
     def replacement(self, name: str, value: Any) -> ast.AST:
         if isinstance(value, ModuleType) and value in (np, math):

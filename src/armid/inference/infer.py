@@ -63,7 +63,7 @@ class Interval:
     """Hold what is known of one parameter, SI.
 
     low, high: 95 % over the mixture of models. noise_low, noise_high: of noise alone, the model in force as it is.
-    causes: what makes the interval wide, with shares of its variance, the largest first.
+    causes: what makes the interval wide, with shares of its width squared, the largest first.
     """
 
     low: float

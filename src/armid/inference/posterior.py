@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 from scipy.special import logsumexp, ndtr
 
+from armid.estimation.information import NORMAL_95
 from armid.estimation.least_squares import held_by_bound
 from armid.inference.checks import train_residuals
 from armid.inference.decisions import MENTIONED, calibration
@@ -191,14 +192,16 @@ class Posterior:
         return self.quantile(parameter, 0.025), self.quantile(parameter, 0.975)
 
     def causes(self, parameter: str, noise: float, beside: str = CONSTANTS_TEXT) -> list[tuple[str, float]]:
-        """Return what makes the interval of a parameter wide, with shares of the variance, the largest first.
+        """Return what makes the interval of a parameter wide, with shares of its width squared, the largest first.
 
         noise: deviation by noise alone, SI. beside: name of the other unknowns of the most probable model.
         """
         atoms, weights, means, deviations = self.holding(parameter)
         first = int(np.argmax(weights))
         best = atoms[first]
-        total, own = float(weights @ (deviations**2 + (means - weights @ means) ** 2)), deviations[first] ** 2
+        low, high = self.interval(parameter)
+        # rare models far away have much of the variance, and little of the interval
+        total, own = ((high - low) / (2.0 * NORMAL_95)) ** 2, deviations[first] ** 2
         if max(total, own) <= 0.0:
             return []
         away: dict[str, float] = {}

@@ -80,7 +80,8 @@ def explore(library: Library, declared: Fit, until: Callable[[Fit], bool] = lamb
         return exploration
     add_unknown(exploration)
     finish_all(exploration)
-    for _ in range(MOST_ENDS):
+    # Far from the noise each leads to a larger model that was never expanded.
+    for _ in range(MOST_ENDS if is_near(exploration) else 1):
         best = exploration.ranked()[0][0]
         if best in exploration.forecasts or exploration.fits[best].records.data.cover is not None:
             break

@@ -14,7 +14,7 @@ from armid.estimation.information import NORMAL_95
 from armid.inference.candidates import ERROR_OF
 from armid.inference.carry_over import missed_sentences, over_noise
 from armid.inference.checks import Finding, Residuals, time_in_words
-from armid.inference.decisions import EXPLAINS, LISTED, OVER_NOISE, SIGNIFICANCE
+from armid.inference.decisions import EXPLAINS, LISTED, MENTIONED, OVER_NOISE, SIGNIFICANCE
 from armid.inference.infer import Inference, sentence_of
 from armid.inference.kinds.hypothesis import words
 from armid.inference.kinds.missing_signal import Missing
@@ -149,7 +149,7 @@ def loop_document(
             *titled(tests | {"What is missing, without a name": missing}),
             *drawn("diagnosis", "against", "autocorrelation", "missing"),
         )),
-        Section("Models that were fitted", (log_table(report["log"]),)),
+        Section("Models that were fitted", (log_table(report),)),
         Section("The next record", (
             *titled({"": advice}), *((advice_table(report["advice"], words),) if report["advice"] else ()),
         )),
@@ -246,12 +246,16 @@ def step_table(report: Mapping[str, Any]) -> Table:
     return table("Steps", ["effect", "RMSE, holdout", "RMSE, train", "or", "parameters", "port"], rows, note)
 
 
-def log_table(log: list[Mapping[str, Any]]) -> Table:
+def log_table(report: Mapping[str, Any]) -> Table:
     """Return one line a model that was fitted."""
+    log = report["log"]
     rows = [(" + ".join(m["hypotheses"]) or "nothing", m["log_probability"], m["chi2_per_sample"]) for m in log]
     columns = ["model", Column("log_probability", "log probability, the best 0", ".2f"),
                Column("chi2_per_sample", "chi2 per sample", ".4g")]  # fmt: skip
-    return table("Models", columns, rows, "Train records; chi2 per sample of noise is 1.")
+    is_named = log and not any(name.startswith("something at") for name in log[0]["hypotheses"])
+    unseen = (" Tests find more than noise in what the first of them leaves: something unknown acts besides."
+              if is_named and report["probabilities"]["unknown"] >= MENTIONED else "")  # fmt: skip
+    return table("Models", columns, rows, f"Train records; chi2 per sample of noise is 1.{unseen}")
 
 
 def parameter_table(report: Mapping[str, Any]) -> Table:

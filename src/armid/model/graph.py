@@ -376,8 +376,10 @@ def definition_of(function: Equation) -> ast.FunctionDef:
     if not isinstance(tree, ast.FunctionDef):
         raise ModelError(f"the equation {label} is not a plain Python function: write it as a def")
     body = [s for s in tree.body if not (isinstance(s, ast.Expr) and isinstance(s.value, ast.Constant))]
-    if not any(isinstance(node, ast.Return) for statement in body for node in ast.walk(statement)):
-        raise ModelError(f"the equation {label} returns nothing: a number is expected")
+    kinds = {type(node) for statement in body for node in ast.walk(statement)}
+    if ast.Return not in kinds:
+        what = "raises an error and returns nothing" if ast.Raise in kinds else "returns nothing"
+        raise ModelError(f"the equation {label} {what}: a number is expected")
     return make_definition(tree.name, tree.args, body)
 
 

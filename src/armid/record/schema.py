@@ -321,6 +321,9 @@ def validated(sheet: type[SheetT], table: object, where: str, further: Collectio
     known = [*(f.name for f in declared), *further]
     for name in table:
         if name not in known:
+            if sheet is RecordSheet and name in {f.name for f in fields(CampaignSheet)}:
+                raise ArmidError(f"{where}: key '{name}' is one of the campaign, it is expected above the first "
+                                 "[[records]]")  # fmt: skip
             raise unknown_name("key", name, known, where)
     values: dict[str, Any] = {}
     for f in declared:

@@ -38,7 +38,7 @@ DIGITS_OF_PLACE = 10
 # So few different weights are those of a late record.
 FEW_PLACES = 8
 # Part of a sample by which a sensor is read after an input changed, from which on it shows what the input was before.
-AT_ONCE = 0.05
+JUST_READ = 0.05
 # Share of the largest plausible size over which differences are taken.
 FAULT_STEP = 1e-3
 
@@ -125,7 +125,7 @@ class Fault:
         """
         grid = record.manoeuvre
         late = value / grid.interval
-        own = np.arange(grid.n_samples) - int(np.ceil(late - AT_ONCE))
+        own = np.arange(grid.n_samples) - int(np.ceil(late - JUST_READ))
         read = {name: u[np.clip(own, 0, u.size - 1)] for name, u in grid.inputs.items()}
         return read, grid.later(late % 1.0).inputs if self.driven else grid.inputs
 
@@ -157,7 +157,7 @@ class Fault:
             if at_once is None:
                 return resampled(record.measured, self.places(record, value))
             read, then = (at_once @ np.array(list(inputs.values())) for inputs in self.inputs_read(record, value))
-            return resampled(record.measured - read, self.places(record, value)) + then
+            return np.asarray(resampled(record.measured - read, self.places(record, value)) + then)
         if self.kind == "gain":
             return record.measured / (1.0 + value)
         if self.constant:
@@ -413,7 +413,7 @@ def hypotheses(records: WhiteRecords) -> list[Hypothesis]:
 def propose(fit: Fit, known: list[Hypothesis], library: Library, changes: Sequence[Proposal] = ()) -> list[Proposal]:
     """Return the faults of records that a fit does not hold, with what the largest plausible size does.
 
-    changes: of parameters. One in the same record may be what an input does there, and then stands for it.
+    changes: of parameters. A gain of an input that one of them in the same record is already is not proposed.
     """
     held = {f.unknown.name for f in fit.others}
     found = library.each(lambda h: proposal(fit, h), [h for h in known if h.name not in held])
