@@ -18,14 +18,16 @@ from rich.console import Console
 import armid
 from armid.api import campaign_of
 from armid.cli.new import INERTIA
-from armid.contract.check import check_thing
+from armid.contract.check import check_campaign, check_thing
 from armid.errors import ArmidError
 from armid.model import EFFECTS, PLANTS
+from armid.record import read_campaign
 from armid.registry import load_registry
 from armid.report.result import Result, Shown
 from armid.report.style import pyplot
 from armid.units import angles_in, scale_of
 from commands import not_drawn
+from synthetic import wheel, write_records
 
 QUICK = {"effects": ["viscous"], "budget": 60}
 # Where a word is near none that is known.
@@ -40,6 +42,25 @@ def axis(synthetic_axis):
 @pytest.fixture(scope="module")
 def found(axis):
     return armid.identify(str(axis), effects=["viscous"], identifier="least_squares", fitness="rmse")
+
+
+def test_a_strength_beyond_its_declared_range_is_found_unless_the_range_was_given(tmp_path):
+    """What a motor's voltage brakes at full speed is all that it drives, twice the range of `viscous`."""
+    rng, times, tables = np.random.default_rng(64), 0.005 * np.arange(800), {}
+    for file in ("a.csv", "b.csv"):
+        drive = np.repeat(rng.uniform(-8.0, 8.0, 8), 100)
+        speed = wheel(drive, 0.005, 5.0, 0.6 / 0.01)[0] + 0.02 * rng.standard_normal(800)
+        tables[file] = {"time_s": times, "drive_V": drive, "angular_velocity_rad_s": speed}
+    head = 'name = "motor"\nplant = "driven_axis"\neffects = ["viscous"]\nhold = "zero"\n[constants]\ngain = 0.05\n'
+    folder = write_records(tmp_path / "motor", head, tables)
+    found = armid.identify(folder, identifier="least_squares")
+    assert found.parameters["viscous.slope"].value == pytest.approx(0.6, rel=0.01)
+    assert found.parameters["inertia"].value == pytest.approx(0.01, rel=0.01)
+    assert not found.at_bound.any()
+    assert all(point.passed for point in check_campaign(read_campaign(folder), EFFECTS) if "plausible" in point.name)
+    high = 0.9 * found.parameters["viscous.slope"].value
+    held = armid.identify(folder, identifier="least_squares", bounds={"viscous.slope": (0.0, high)}, interval=False)
+    assert held.parameters["viscous.slope"].value == pytest.approx(high)
 
 
 def annealing(value, low, high, budget, random, start=None, step=0.1):

@@ -189,7 +189,8 @@ TOLD = {
 COMPILED = {
     "arrays": (lambda omega, level: level * np.linalg.norm(omega),
                r"the equation 'bad.torque' cannot be compiled \(numba has no norm\(float64\)\): numpy"),
-    "several": (lambda omega, level: np.array([omega, level]), r"\(it returns several numbers\): one number is expected"),
+    "several": (lambda omega, level: np.array([omega, level]),
+                r"\(it returns several numbers\): one number is expected"),
     "import": (imports, r"the equation 'bad.torque' cannot be compiled \(numba: Use of unsupported opcode"),
     "None": (sometimes_nothing, r"the equation 'bad.torque' cannot be compiled \(it does not return a number in every"),
 }  # fmt: skip

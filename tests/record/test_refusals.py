@@ -79,6 +79,8 @@ TOML = {
     "misspelt campaign key": ('efects = ["coulomb"]\n' + GOOD, ["campaign.toml", "'efects'", "did you mean 'effects'"]),
     "misspelt record key": (GOOD.replace("target_angle_deg", "target_angel_deg"),
                             ["campaign.toml, record 'lower.csv'", "'target_angel_deg'", "mean 'target_angle_deg'"]),
+    "campaign key in a record": (f'{GOOD}effects = ["coulomb"]\n',
+                                 ["record 'lower.csv'", "'effects' is one of the campaign", "above the first [["]),
     "supply not said": (GOOD.replace("supply_V = 28.0", ""),
                         ["campaign/campaign.toml, record 'lower.csv'", "'supply_V' is missing", "U under [constants]"]),
     "no stroke": (GOOD.replace("22.0", "-48.0"), ["target_angle_deg is -48", "a motion is expected"]),
