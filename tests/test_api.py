@@ -59,7 +59,8 @@ def test_a_strength_beyond_its_declared_range_is_found_unless_the_range_was_give
     assert not found.at_bound.any()
     assert all(point.passed for point in check_campaign(read_campaign(folder), EFFECTS) if "plausible" in point.name)
     high = 0.9 * found.parameters["viscous.slope"].value
-    held = armid.identify(folder, identifier="least_squares", bounds={"viscous.slope": (0.0, high)}, interval=False)
+    with pytest.warns(UserWarning, match=r"viscous\.slope may lie outside the range that was searched"):
+        held = armid.identify(folder, identifier="least_squares", bounds={"viscous.slope": (0.0, high)}, interval=False)
     assert held.parameters["viscous.slope"].value == pytest.approx(high)
 
 
