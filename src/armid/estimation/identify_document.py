@@ -352,8 +352,8 @@ def misfit_remarks(identification: Identification) -> list[str]:
     if identification.space.free.any():
         why = (
             "the model lacks something, a constant is not what it is declared to be, an input is noisy, the sensor is "
-            "noisier in motion, or the search has not come to the minimum. The intervals are widened to the residual and its correlation in time, and hold only as "
-            "far as what is lacking averages out."
+            "noisier in motion, or the search has not come to the minimum. The intervals are widened to the residual "
+            "and its correlation in time, and hold only as far as what is lacking averages out."
         )
     return [f"The residual is this many times the noise: {text}{more}: {why}"]
 
