@@ -301,9 +301,9 @@ def level_text(level: Level, unit: str, noise: float) -> str:
                 "groups do not depend on it.")  # fmt: skip
     if level.from_residual:
         times = level.rms / noise if noise else np.inf
-        return (f"the residual of {value:.2g} {name} is {times:.2g} times the noise: the model lacks something, or a "
-                "constant is not what it is declared to be; the intervals, widened to the residual and its correlation "
-                "in time, hold only as far as what is lacking averages out.")  # fmt: skip
+        return (f"the residual of {value:.2g} {name} is {times:.2g} times the noise: the model lacks something or "
+                "a constant is off. The intervals are widened to the residual and its correlation in time, and hold "
+                "only as far as what is lacking averages out.")  # fmt: skip
     share = level.effective_fraction
     coloured = "" if share > 0.9 else f", coloured: one sample in {1 / share:.2g} is new"
     return f"noise {value:.2g} {name} rms{coloured}."

@@ -351,9 +351,9 @@ def misfit_remarks(identification: Identification) -> list[str]:
     why = "the model, in which nothing is free, lacks something."
     if identification.space.free.any():
         why = (
-            "the model lacks something, a constant is not what it is declared to be, an input is noisy, the sensor is "
-            "noisier in motion, or the search has not come to the minimum. The intervals are widened to the residual "
-            "and its correlation in time, and hold only as far as what is lacking averages out."
+            "the model lacks something, a constant is off, an input is noisy, the sensor is noisier in motion, or the "
+            "search has not come to the minimum. The intervals are widened to the residual and its correlation in "
+            "time, and hold only as far as what is lacking averages out."
         )
     return [f"The residual is this many times the noise: {text}{more}: {why}"]
 
