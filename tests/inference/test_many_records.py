@@ -61,7 +61,7 @@ def test_a_coarse_record_has_a_noise_of_its_own(tmp_path):
 def test_what_leads_on_some_records_is_fitted_to_all(tmp_path, monkeypatch):
     many = campaign(tmp_path, 0.01, 1e-4)
     data = whitened(many.train, many.plant)
-    monkeypatch.setattr(search, "SAMPLES", data.n_simulated // 4)
+    monkeypatch.setattr(search, "SAMPLES", len(data.sound) // 4)
     messages, effects = [], {n: EFFECTS[n] for n in FEW}
     found = infer(*prepared(Model(many.plant), many, effects, told=messages.append))
     assert any(m.startswith("looking at 2 of 8 records") for m in messages)
@@ -74,8 +74,8 @@ def test_what_leads_on_some_records_is_fitted_to_all(tmp_path, monkeypatch):
     assert level == pytest.approx(FRICTION, rel=0.02)
 
 
-@pytest.mark.parametrize(("n_samples", "which"), [(40_000, [1, 4]), (11_000, None), (24_000, [1, 4]), (48_000, [3])])
+@pytest.mark.parametrize(("n_samples", "which"), [(40_002, [1, 4]), (11_004, None), (24_000, [1, 4]), (48_000, [3])])
 def test_which_records_are_looked_at(monkeypatch, n_samples, which):
-    data = SimpleNamespace(records=(None,) * 6, n_simulated=n_samples)
+    data = SimpleNamespace(records=(SimpleNamespace(n_samples=n_samples // 6),) * 6)
     monkeypatch.setattr(search, "SAMPLES", 8_000)
     assert search.some_records(data) == which

@@ -177,7 +177,7 @@ def some_records(data: WhitenedData) -> list[int] | None:
     A sensor that holds its value tells as much as it has samples, however many are simulated.
     """
     n = len(data.records)
-    n_some = int(np.ceil(n * SAMPLES / len(data.sound)))
+    n_some = int(np.ceil(n * SAMPLES / sum(record.n_samples for record in data.records)))
     return None if SPARED * n_some > n else [(2 * i + 1) * n // (2 * n_some) for i in range(n_some)]
 
 
