@@ -226,10 +226,9 @@ def identify(
     ArmidError
         For all else that cannot be used: an identifier, its options, a fitness, a budget.
     """
-    from armid.estimation.data_checks import data_issues, with_room
+    from armid.estimation.data_checks import data_issues, roomy_space
     from armid.estimation.identify import identify as run
     from armid.problem.fitness import as_fitness, fitness_of_name
-    from armid.problem.space import space_of
 
     if not isinstance(options or {}, Mapping):
         raise ArmidError(f"options is {quoted(options)}: name -> value is expected")
@@ -242,8 +241,7 @@ def identify(
     searcher = identifier_of(identifier or by_default, registry).with_options(options or {})
     if budget is None:
         budget = PAPER_BUDGET if paper or identifier is not None else USUAL_BUDGET
-    given = {*(bounds or {}), *(fix or {})}
-    space = space or with_room(read, composed, space_of(composed, read.parameters, bounds, fix), given)
+    space = space or roomy_space(read, composed, bounds, fix)
     with angles_in(read.angle):
         issues = data_issues(read, composed, space)
     with warned_once(UserWarning):
@@ -297,13 +295,11 @@ def examine(
     Examination
         It prints itself; `table`, `plot()`, `to_dict()`, `save(folder)`.
     """
-    from armid.estimation.data_checks import with_room
+    from armid.estimation.data_checks import roomy_space
     from armid.estimation.examine import examine as run
-    from armid.problem.space import space_of
 
     _, read, composed = opened(campaign, effects, plugins, window, bounds, fix, plant, model, units)
-    given = {*(bounds or {}), *(fix or {})}
-    box = space or with_room(read, composed, space_of(composed, read.parameters, bounds, fix), given)
+    box = space or roomy_space(read, composed, bounds, fix)
     at = free_values(box, x, where) if isinstance(x, Mapping) else x if x is None else np.asarray(x, dtype=np.float64)
     with status_line(progress) as show:
         return run(read, composed, box, at, noise, by, accuracy, show)

@@ -104,7 +104,7 @@ def test_a_held_input_keeps_its_impulse():
 
 @pytest.mark.parametrize("part", [0.2, 0.5, 0.9])
 def test_a_held_input_comes_later_by_a_part_of_a_sample(part):
-    """A free mass has the right speed at the samples."""
+    """A free mass has the right speed at the samples; whole samples are exact, and begin as was last known."""
     values = np.repeat([0.0, 2.0, -1.0, 3.0], 5)
     grid, fine = Manoeuvre(0.1, 20, {}, {"u": values}, "zero"), 1000
     there = np.repeat(values, fine)[np.maximum(np.arange(20 * fine) - round(part * fine), 0)]
@@ -112,6 +112,9 @@ def test_a_held_input_comes_later_by_a_part_of_a_sample(part):
     later = grid.later(part).inputs["u"]
     np.testing.assert_allclose(np.append(0.0, np.cumsum(later))[:20], speed, atol=1e-9)
     np.testing.assert_allclose(grid.later(1.0).inputs["u"][1:], values[:-1])
+    part_of_it = grid.part(6, 8, {})
+    assert np.array_equal(part_of_it.later(3.0).inputs["u"], values[3:11])
+    assert np.array_equal(part_of_it.later(-2.0).inputs["u"], [*values[8:14], values[13], values[13]])
 
 
 def test_noise_stays_white_on_the_grid():

@@ -12,14 +12,13 @@ from armid.contract.trials import ContractPoint
 from armid.engine import accuracy_against, calibrate
 from armid.errors import ArmidError
 from armid.estimation.corrections import DataIssue
-from armid.estimation.data_checks import data_issues, with_room
+from armid.estimation.data_checks import data_issues, roomy_space
 from armid.identifiers import Identifier, as_identifier
 from armid.identifiers.own import global_generators
 from armid.model import PLANTS, Array, Effect, Model, Plant
 from armid.problem.fitness import Fitness, as_fitness
 from armid.problem.meter import BudgetIgnoredError, Meter, Metered, MeterTermination
 from armid.problem.problem import ReadyRecord
-from armid.problem.space import space_of
 from armid.record import Campaign, Record
 
 CHECK_INTERVAL, NOISE_OF_TRIAL = 1e-3, 0.01
@@ -64,7 +63,7 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[C
         yield ContractPoint(f"{record.file}, {record.role}", True, f"{text} (from {noise.source}){unused}")
     try:
         model = campaign.model(effects)
-        space = with_room(campaign, model, space_of(model, campaign.parameters))
+        space = roomy_space(campaign, model)
         free = ", ".join(space.free_names) or "nothing"
         yield ContractPoint("model", True, f"{model.plant.name} with {len(model.effects)} effects, free: {free}")
         if campaign.taken_as_exact:

@@ -277,6 +277,8 @@ def load_module(parts: KernelParts) -> ModuleType:
 
 NO_NUMBER_IN_A_BRANCH = "it does not return a number in every case"
 SEVERAL_NUMBERS = "it returns several numbers"
+# What is expected in place of that.
+EXPECTED = {NO_NUMBER_IN_A_BRANCH: "a number from each branch is", SEVERAL_NUMBERS: "one number is"}
 
 
 def compile_error(error: Exception) -> ArmidError:
@@ -285,14 +287,7 @@ def compile_error(error: Exception) -> ArmidError:
     match = equation.search(text) or equation.search(definition_above(error))
     name = f"the equation '{match[1].replace('__scalar', '').replace('__', '.')}'" if match else "an equation"
     why = cause(text)
-    is_open = why == NO_NUMBER_IN_A_BRANCH
-    expected = (
-        "a number from each branch is"
-        if is_open
-        else "one number is"
-        if why == SEVERAL_NUMBERS
-        else "numpy, math, numbers and plain functions of numbers are"
-    )
+    expected = EXPECTED.get(why, "numpy, math, numbers and plain functions of numbers are")
     return ArmidError(f"{name} cannot be compiled ({why}): {expected} expected")
 
 

@@ -228,12 +228,8 @@ def moved(record: Record, seconds: float) -> Record:
     """
     shift = round(seconds / record.manoeuvre.interval)
 
-    def driven_later(piece: Piece) -> Piece:
-        rows = np.clip(np.arange(piece.manoeuvre.n_samples) - shift, 0, piece.manoeuvre.n_samples - 1)
-        return piece.with_inputs({name: values[rows] for name, values in piece.manoeuvre.inputs.items()})
-
     if record.manoeuvre.inputs:
-        return record.with_pieces(driven_later)
+        return record.with_pieces(lambda piece: replace(piece, manoeuvre=piece.manoeuvre.later(shift)))
     earlier, pieces = {s.output: s.measured.copy() for s in record.signals}, []
     for piece in record.pieces:
         begin, end = max(piece.window.start, -shift), min(piece.window.stop, piece.manoeuvre.n_samples - shift)

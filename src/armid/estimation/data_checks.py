@@ -5,7 +5,7 @@ the declared model is fitted roughly to the train records; where it misses more 
 of mistakes is undone in turn, and one is named only where that takes away most of the misfit.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -114,14 +114,18 @@ def data_issues(campaign: Campaign, model: Model, space: Space) -> tuple[DataIss
     return (*seen, *(s for s in times if not files & {"", s.record}), *issues)
 
 
-def with_room(campaign: Campaign, model: Model, space: Space, given: Iterable[str] = ()) -> Space:
-    """Return the space with ranges eight times as wide of those strengths that a rough fit holds at their end.
+def roomy_space(
+    campaign: Campaign, model: Model, bounds: Mapping[str, tuple[float, float]] | None = None,
+    fixed: Mapping[str, float] | None = None,
+) -> Space:  # fmt: skip
+    """Return the space of a model, eight times as wide for those strengths that a rough fit holds at their end.
 
     The range of an effect's strength in the machine's scales is a size to expect, and no wall: what a motor's voltage
-    brakes at full speed is all that it drives. One that the campaign or the user gave (given: names) stays.
+    brakes at full speed is all that it drives. One that the campaign or the user gave stays. Arguments as `space_of`.
     """
+    space = space_of(model, campaign.parameters, bounds, fixed)
     sized = {n for n in sized_parameters(model) if "." in n} & set(space.free_names)
-    sized -= {*campaign.parameters, *given}
+    sized -= {*campaign.parameters, *(bounds or {}), *(fixed or {})}
     if not sized:
         return space
     train = [shortened(filled(r), len(campaign.train)) for r in campaign.train]

@@ -31,8 +31,8 @@ OUT_OF_TOLERANCE = 0.05
 # Periods of an effect that repeats with position that the travel must hold: fewer fit anything that bends. Half a
 # period of cogging stood for a spring that hardens, with a probability of 1.00.
 PERIODS = 5
-# Change of a record over its noise (rms) from which it is faulty: a clock a fifth of a sample off moved one by 0.28,
-# and was something unknown, where a shift that is moved between its samples may gain by what that smooths.
+# Change of a record over its noise (rms) from which it is faulty. A lateness of 0.4 samples moved a record by 0.28, and
+# was something unknown while that did not count.
 MOVES = 0.25
 # Log posterior odds within which models are expanded, and count as rivals for the next record (Madigan, Raftery 1994).
 WINDOW = math.log(100.0)

@@ -137,13 +137,14 @@ class Library:
         key = frozenset(active)
         if key not in self._problems:
             model = self.compiled_model(active)
+            space = self.space(model, active)
             if active:
                 # What is tried needs no more than that; what is found good is calibrated anew (`recalibrated`).
                 known = [self.schedules(k, model, near or {}) for k in active]
                 replays = scheduled_replays(self.data.records, model, known)
             else:
-                replays = self.replays(model, self.space(model, active), near or {}, self.misfit)
-            self._problems[key] = WhiteRecords(replays, self.space(model, active), self.data, self.known)
+                replays = self.replays(model, space, near or {}, self.misfit)
+            self._problems[key] = WhiteRecords(replays, space, self.data, self.known)
         return self._problems[key]
 
     def schedules(self, key: EffectKey, model: Model, near: Mapping[str, float]) -> "Schedules":

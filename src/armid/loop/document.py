@@ -253,7 +253,7 @@ def log_table(report: Mapping[str, Any]) -> Table:
     columns = ["model", Column("log_probability", "log probability, the best 0", ".2f"),
                Column("chi2_per_sample", "chi2 per sample", ".4g")]  # fmt: skip
     is_named = log and not any(name.startswith("something at") for name in log[0]["hypotheses"])
-    unseen = (" Tests find more than noise in what the first of them leaves: something unknown acts besides."
+    unseen = (" Tests, or records held out, find more than the first of them explains: something unknown acts besides."
               if is_named and report["probabilities"]["unknown"] >= MENTIONED else "")  # fmt: skip
     return table("Models", columns, rows, f"Train records; chi2 per sample of noise is 1.{unseen}")
 

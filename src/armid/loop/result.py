@@ -62,8 +62,7 @@ class RecordFault:
     value, low, high: size with its 95 % interval [unit]; from_s, to_s: where it is [s]; None where there is no such
     thing. action: "freed" (undone) or "left_out" (of samples). output: whose sensor it is, or the input whose gain it
     is, "" where the plant has but one output, and of the whole file. parameter: what is another, or has the trend, then
-    others that do as well; "" for other
-    kinds.
+    others that do as well; "" for other kinds.
     """
 
     record: str

@@ -71,16 +71,19 @@ class Manoeuvre:
             before={name: values[sooner:first] for name, values in known.items()} if sooner < first else {},
         )  # fmt: skip
 
-    def later(self, part: float) -> "Manoeuvre":
-        """Return the manoeuvre with held inputs that come later by a part of a sample: their mean over each interval.
+    def later(self, samples: float) -> "Manoeuvre":
+        """Return the manoeuvre with inputs that come later by so many samples, earlier where negative.
 
-        What they drive has the right speed at the samples. part: from 0 to 1. Before the record an input is as it was
-        last known, or as it begins.
+        Of a part of a sample a held input takes its mean over each interval: what it drives has the right speed at the
+        samples. Before the record an input is as it was last known, or as it begins; behind it, as it ends.
         """
+        whole = int(np.floor(samples))
 
         def moved(name: str, values: Array) -> Array:
-            last = self.before[name][-1] if name in self.before else values[0]
-            return values - part * np.diff(values, prepend=last)
+            known = np.concatenate([self.before.get(name, values[:1]), values])
+            rows = np.arange(known.size - values.size, known.size) - whole
+            now, previous = (known[np.clip(r, 0, known.size - 1)] for r in (rows, rows - 1))
+            return np.asarray(now - (samples - whole) * (now - previous))
 
         return replace(self, inputs={name: moved(name, values) for name, values in self.inputs.items()})
 

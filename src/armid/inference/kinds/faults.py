@@ -125,9 +125,13 @@ class Fault:
         """
         grid = record.manoeuvre
         late = value / grid.interval
-        own = np.arange(grid.n_samples) - int(np.ceil(late - JUST_READ))
-        read = {name: u[np.clip(own, 0, u.size - 1)] for name, u in grid.inputs.items()}
-        return read, grid.later(late % 1.0).inputs if self.driven else grid.inputs
+        then = grid.later(late % 1.0) if self.driven else grid
+        return grid.later(np.ceil(late - JUST_READ)).inputs, then.inputs
+
+    def at_once(self, record: Record, inputs: Mapping[str, Array]) -> Array:
+        """Return what of a signal follows held inputs at once, (n_samples,)."""
+        share = self.fed.get(record.output)
+        return np.zeros(record.measured.size) if share is None else share @ np.array(list(inputs.values()))
 
     def undone_piece(self, piece: Piece, value: float, plant: Plant, output: str) -> Piece:
         if self.driven:
@@ -153,11 +157,8 @@ class Fault:
     def measured(self, record: Record, value: float) -> Array:
         """Return what was measured without the fault, (n_samples,)."""
         if self.kind in OF_TIMES:
-            at_once = self.fed.get(record.output)
-            if at_once is None:
-                return resampled(record.measured, self.places(record, value))
-            read, then = (at_once @ np.array(list(inputs.values())) for inputs in self.inputs_read(record, value))
-            return np.asarray(resampled(record.measured - read, self.places(record, value)) + then)
+            read, then = (self.at_once(record, inputs) for inputs in self.inputs_read(record, value))
+            return resampled(record.measured - read, self.places(record, value)) + then
         if self.kind == "gain":
             return record.measured / (1.0 + value)
         if self.constant:
@@ -200,27 +201,28 @@ def faults_of(base: WhiteRecords, index: int) -> Iterator[Fault]:
     """Yield what may be wrong in a record; faults of a whole file belong to its first output."""
     model, record = base.model, base.data.each[index]
     yield from (Fault(kind) for kind in OF_SENSOR)
-    if len(of_file(base, index)) > 1:
-        yield Fault("late", alone=True, fed=fed_through(base, index))
-    if index != of_file(base, index)[0]:
+    fed, inside = fed_through(base, index), of_file(base, index)
+    if len(inside) > 1:
+        yield Fault("late", alone=True, fed={o: share for o, share in fed.items() if o == record.output})
+    if index != inside[0]:
         return
-    yield late_file(base, index)
+    yield Fault("late", driven=bends(base, index), fed=fed)
     yield Fault("clock")
     # of one output the gain of its sensor does nearly the same
-    yield from (Fault("gain", input=i.name) for i in model.plant.inputs if len(of_file(base, index)) > 1)
+    yield from (Fault("gain", input=i.name) for i in model.plant.inputs if len(inside) > 1)
     keys = [key for key in model.plant.keys if key.constant in record.constants]
     starts = {name for node in model.graph.of_kind("initial") for name in leaves_of(model, node.key)}
     yield from (Fault("start", key.constant) for key in keys if key.constant in starts and not key.boolean)
     yield from (Fault("label", key.constant) for key in keys if key.boolean)
 
 
-def late_file(base: WhiteRecords, index: int) -> Fault:
-    """Return the fault of a late file, as held inputs drive what its sensors read."""
+def bends(base: WhiteRecords, index: int) -> bool:
+    """Tell whether a signal of a file that reads no input bends where a held input jumps."""
     graph, inputs = base.model.graph, {i.name for i in base.model.plant.inputs}
     read = [leaves_of(base.model, signal) for signal in signals_read(base, index).values()]
     states = {key for leaves in read if leaves.isdisjoint(inputs) for key in leaves if graph.nodes[key].kind == "state"}
-    bends = any(not leaves_of(base.model, f"rate__{key}").isdisjoint(inputs) for key in states)
-    return Fault("late", driven=bends and holds_inputs(base, index), fed=fed_through(base, index))
+    return holds_inputs(base, index) and any(
+        not leaves_of(base.model, f"rate__{key}").isdisjoint(inputs) for key in states)  # fmt: skip
 
 
 def holds_inputs(base: WhiteRecords, index: int) -> bool:
@@ -230,12 +232,14 @@ def holds_inputs(base: WhiteRecords, index: int) -> bool:
 
 def fed_through(base: WhiteRecords, index: int) -> dict[str, Array]:
     """Return by how much outputs of a file that read held inputs at once follow these, as the other records tell."""
+    if not holds_inputs(base, index):
+        return {}
     inputs, file = {i.name for i in base.model.plant.inputs}, base.data.each[index].file
     outputs = [o for o, key in signals_read(base, index).items() if not leaves_of(base.model, key).isdisjoint(inputs)]
     rows = {o: [r for r in base.data.each if r.output == o and r.file != file] for o in outputs}
     return {o: share_at_once([r.measured for r in records],
                              [np.array(list(r.manoeuvre.inputs.values())) for r in records])
-            for o, records in rows.items() if records and holds_inputs(base, index)}  # fmt: skip
+            for o, records in rows.items() if records}  # fmt: skip
 
 
 def signals_read(base: WhiteRecords, index: int) -> dict[str, str]:
@@ -314,9 +318,7 @@ def delayed(base: WhiteRecords, index: int, z: Array, fault: Fault) -> list[Arra
         step = record.manoeuvre.interval
         samples = np.concatenate([p.start_index + np.arange(p.manoeuvre.n_samples)[own]
                                   for p, own in zip(replay.pieces, replay.record.samples, strict=True)])  # fmt: skip
-        smooth = simulated[0]
-        if record.output in fault.fed:
-            smooth = smooth - (fault.fed[record.output] @ np.array(list(record.manoeuvre.inputs.values())))[samples]
+        smooth = simulated[0] - fault.at_once(record, record.manoeuvre.inputs)[samples]
         changes.append(-np.gradient(smooth, record.spacing) * (1.0 if fault.kind == "late" else step * samples))
     return changes
 
@@ -450,8 +452,8 @@ def refit(hypothesis: Hypothesis, fit: Fit, about: Expansion, ahead: Forecast, l
     if what.fault.kind == "label":
         return unless_diverged(lambda: relabelled(fit, what, about.scale.weight, limit))
     unknowns = [*(f.unknown for f in fit.others), what.unknown(hypothesis.name, base)]
-    best = np.unravel_index(int(np.argmax(ahead.log_factor)), ahead.log_factor.shape)
-    begun = {hypothesis.name: float(ahead.strength[best])} if what.fault.fed else None
+    # a signal that jumps leads nowhere from a shift of 0
+    begun = {hypothesis.name: ahead.best(1)[0][1]} if what.fault.fed else {}
     again = unless_diverged(lambda: freed(fit, base, unknowns, about.scale.weight, limit, rough=True, begun=begun))
     if again is None:
         return None
