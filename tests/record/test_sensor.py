@@ -229,3 +229,18 @@ def test_a_coarse_sensor_tells_its_noise_by_the_motion_where_its_step_hides_it_a
         moved = np.round(motion + rng.normal(0, own, (20, motion.size)))
         sized = [noise_of(rest, one).rms for rest, one in zip(rests, moved, strict=True)]
         assert np.array(sized) == pytest.approx(np.sqrt(own**2 + 1 / 12), rel=0.13)
+
+
+def test_an_even_speed_between_two_steps_and_one_that_a_record_begins_with_are_at_no_limit(rng):
+    """As a counting sensor reads a motor: the motion seems noisy, as neighbouring values take turns."""
+    speed = 15.5 * (1.0 - np.exp(-np.maximum(EARLY - 0.2, 0.0) / 0.03))
+    turns = np.where(EARLY > 0.25, 0.4 * (-1.0) ** np.arange(FEW), 0.0)
+    turns[300::50] = 0.4
+    # as one sample of a few goes astray, a value stands for longer than noise leaves it by chance
+    turns[620:630] = 0.4
+    counted = np.rint(speed + turns)
+    for known in (True, False):
+        assert found(counted, noise=0.6, sensor=Sensor(1.0), known=known) == {}
+    begun = np.concatenate([np.full(60, 4.0), 4.0 + 20.0 * (1.0 - np.exp(-np.arange(200) / 20.0))])
+    even = np.round(begun / 0.1) * 0.1
+    assert found(even, noise=0.2, sensor=Sensor(0.1), sudden=np.zeros(260, dtype=np.bool_)) == {}

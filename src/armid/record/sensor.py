@@ -70,10 +70,11 @@ class Sensor:
         """Return values as the sensor rounds them; known: one of its readings [unit of the output]."""
         return known + np.round((values - known) / self.step) * self.step if self.step else values
 
-    def counted(self, values: Array, begin: float) -> Array:
-        """Return a speed as the differences of its counts; begin: share of a count that has passed before."""
-        counts = np.floor(np.cumsum(values) / self.step + begin)
-        return np.asarray(self.step * np.diff(counts, prepend=0.0))
+    def counting_error(self, values: Array, begin: float, over: int = 1) -> Array:
+        """Return what counts of so many samples leave of a speed; begin: share of a count that has passed before."""
+        way = np.concatenate([np.zeros(over), np.cumsum(values)]) / over
+        counts = np.floor(way / self.step + begin)
+        return np.asarray(self.step * (counts[over:] - counts[:-over]) - (way[over:] - way[:-over]))
 
 
 def sensor_of(values: Array) -> Sensor:
@@ -483,15 +484,14 @@ def repeated_samples(values: Array, noise: float, known: bool, sensor: Sensor, s
         return {"clipped": clipped, "stuck": stuck}
     usual = float(np.sqrt(np.mean((values[RUN_UP:] - values[:-RUN_UP]) ** 2)))
     leap = max(ABOVE_NOISE * noise, LEAP * float(np.quantile(np.abs(np.diff(values)), USUAL)))
-    repeated = runs(values)
+    repeated, by_chance = runs(values), longest_by_chance(noise, sensor.step, values.size)
     for limit in (float(values.max()), float(values.min())):
         visited = visits(values, limit) if abs(limit) > sensor.step else []
         longest = max((end - begin for begin, end in repeated if values[begin] == limit), default=0)
         # noise leaves a limit for some samples where the signal reaches it; a frozen sensor has one run
         in_noise = known and int(np.sum(values == limit)) > longest
-        if longest and any(in_noise or is_abrupt(values, *stretch, ABRUPT * usual) for stretch in visited):
+        if longest > by_chance and any(in_noise or is_abrupt(values, *v, ABRUPT * usual) for v in visited):
             clipped |= values == limit
-    by_chance = longest_by_chance(noise, sensor.step, values.size)
     for begin, end in repeated:
         if end - begin <= by_chance:
             continue
@@ -524,10 +524,13 @@ def visits(values: Array, limit: float) -> list[tuple[int, int]]:
 
 
 def is_abrupt(values: Array, begin: int, end: int, least: float) -> bool:
-    """Tell whether a signal reaches and leaves a stretch of equal values by so much within a few samples."""
+    """Tell whether a signal reaches and leaves a stretch of equal values by so much within a few samples.
+
+    With which a record begins was not reached: a machine at an even speed leaves it so as its drive changes.
+    """
     sides = (values[max(begin - RUN_UP, 0) : begin], values[end : end + RUN_UP])
     away = [float(np.mean(np.abs(side - values[begin]))) for side in sides if side.size == RUN_UP]
-    return bool(away) and min(away) >= least
+    return begin >= RUN_UP and min(away) >= least
 
 
 def runs(values: Array, shortest: int = REPEATED) -> list[tuple[int, int]]:
