@@ -8,7 +8,7 @@ from typing import Any
 # no wrong name, and no full answer either.
 SAME_PHYSICS = {
     "dead_time": ("drive_delay", "controller_delay", "output_delay", "angle_delay", "position_delay", "gyro_delay"),
-    "lag": ("drive_lag", "output_lag", "angle_lag", "position_lag", "gyro_lag", "tachometer_lag"),
+    "lag": ("drive_lag", "output_lag", "angle_lag", "position_lag", "gyro_lag", "tachometer_lag", "output_average"),
     "saturation": ("drive_saturation", "flux_saturation", "torque_constant_droop"),
     "dead_zone": ("dead_zone",),
     "dry_friction": ("coulomb", "stribeck", "presliding"),

@@ -94,6 +94,11 @@ def of_sensor(end: str) -> Callable[[Machine], Library]:
     return lambda machine: ((f"{machine.outputs[0].prefix}_{end}",),)
 
 
+def mean_of_speed(machine: Machine) -> Library:
+    """Return the effect of a mean over a time, which armid has at the sensor of a speed alone."""
+    return of_sensor("average")(machine) if machine.outputs[0].state == 1 else ()
+
+
 def late_whole(where: str) -> Callable[[Machine], Library]:
     """Return the effects of a dead time; a late sensor is a late drive where one output answers a recorded drive."""
 
@@ -304,7 +309,7 @@ FORMS = (
     Form("lag", "sensor_second_order", "sensor", {"time": (0.004, 0.012, "s"), "damping": (0.4, 1.2, "1")},
          second_order_sensor, DOEBELIN, named("gyro_lag"), fits=lambda machine: machine.outputs[0].state == 1),
     Form("lag", "sensor_average", "sensor", {"time": (0.02, 0.15, "s")}, averaging_sensor,
-         "Brown, Schneider, Mulligan 1992, doi:10.1109/41.161471"),
+         "Brown, Schneider, Mulligan 1992, doi:10.1109/41.161471", mean_of_speed),
     Form("saturation", "rational", "drive", PART, rational, "Krishnan, PM Synchronous and BLDC Motor Drives",
          named("drive_saturation")),
     Form("saturation", "droop", "drive", {"sharpness": (0.2, 1.5, "1/effort2")}, droop,

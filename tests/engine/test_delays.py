@@ -212,3 +212,24 @@ def test_the_voltage_of_a_plug_in_is_late_exactly_and_its_derivative_by_the_dela
     slope = (found[4] - found[5]) / 2e-5
     expected = (exact_speed(volts, 0.0142 + 1e-7) - exact_speed(volts, 0.0142 - 1e-7)) / 2e-7
     assert np.abs(slope - expected).max() <= 1e-3 * np.abs(expected).max()
+
+
+def test_a_mean_over_a_window_is_the_way_over_its_time():
+    """Of a machine that moves before the start too; a window below a microsecond is taken in part."""
+    model = Model(AXIS) + EFFECTS["viscous"] + EFFECTS["output_average"]
+    manoeuvre = Manoeuvre(STEP_S, N_SAMPLES, {"start_speed": 0.3}, {"u": DRIVE}, "zero")
+    windows, times = [0.0, 1e-7, 1e-4, 0.002, 0.0071, 0.032, 2.0], manoeuvre.times()
+    population = candidates(model, [
+        {"mass": MASS, "viscous.slope": SLOPE, "output_average.window": window} for window in windows
+    ])  # fmt: skip
+    found = simulate(model, manoeuvre, population, Schedule(4)).output
+    past = solved(lambda t, y, past, inside: [y[1], (DRIVE[int(inside / STEP_S)] - SLOPE * y[1]) / MASS], [0.0, 0.3],
+                  times, times[-1])  # fmt: skip
+
+    def way(t):
+        return past(t)[0] if t > 0.0 else 0.3 * t
+
+    np.testing.assert_array_equal(found[0], simulate(Model(AXIS) + EFFECTS["viscous"], manoeuvre, [[MASS, SLOPE]],
+                                                     Schedule(4)).output[0])  # fmt: skip
+    for window, signal in zip(windows[2:], found[2:], strict=True):
+        assert np.abs(signal - [(way(t) - way(t - window)) / window for t in times]).max() <= 2e-8

@@ -20,6 +20,7 @@ from armid.inference.library import Library, calibrated_replays
 from armid.inference.model import Fit, beyond, decomposed
 from armid.inference.whitening import WhitenedData, WhiteRecords, whitened, with_answers
 from armid.model import Array, Model
+from armid.model.effects.sensor import average_error
 from armid.problem.problem import Replay, with_each
 from armid.problem.starts import with_starts
 from armid.record import Record
@@ -134,14 +135,26 @@ class Residuals:
         rng, signals = np.random.default_rng(0), [r.signal(self.candidate[np.newaxis])[0] for r in self.replays]
         sizes = [level.rms if self.data.known else rms(raw) for level, raw in zip(levels, self.raw, strict=True)]
         fine = [np.sqrt(max(size**2 - s.rounding**2, 0.0)) for size, s in zip(sizes, sensors, strict=True)]
+        counted = [
+            self.window(r) or int(level.alternation > 0.0) for r, level in zip(self.replays, levels, strict=True)
+        ]
         draws = []
         for _ in range(N_ROUNDED):
-            errors = [sensor.counted(y, rng.random()) - y if level.alternation and sensor.step else
+            errors = [sensor.counting_error(y, rng.random(), over) if over and sensor.step else
                       sensor.reading(y + size * rng.standard_normal(len(y)), float(r.measured[0])) - y
-                      for level, sensor, y, size, r in zip(levels, sensors, signals, fine, self.replays, strict=True)
+                      for over, sensor, y, size, r in zip(counted, sensors, signals, fine, self.replays, strict=True)
                       ]  # fmt: skip
             draws.append(self.without_memory(self.data.white(errors)))
         return draws
+
+    def window(self, replay: Replay) -> int:
+        """Return over how many samples the model holds an output to be the mean, 0 where it does not."""
+        port, values = (
+            self.model.plant.outputs[replay.place].port,
+            dict(zip(self.model.parameters, self.candidate, strict=True)),
+        )
+        means = [e for e in self.model.effects if e.adds.get(port) is average_error]
+        return round(values[f"{means[0].name}.window"] / replay.record.spacing) if means else 0
 
     @cached_property
     def raw(self) -> list[Array]:

@@ -1,5 +1,6 @@
 """The sensor: what is recorded of the motion, of a speed at the port `output`, of other outputs at their own."""
 
+from dataclasses import replace
 from functools import partial
 from inspect import signature
 
@@ -12,6 +13,8 @@ from armid.model.plant import Output, Plant
 
 def sensor_effects(plant: Plant) -> dict[str, Effect]:
     """Return name -> bias, scale, delay and lag (`hub_angle_bias`) of each output that has a port of its own.
+
+    A speed has a mean over a window (`hub_speed_average`) as well: it is often counted, a position is read.
 
     At `output` the library's own are added where `omega` is what is recorded. What the sensor sees is its signal
     without what is added at the port, where that is one state or quantity.
@@ -39,6 +42,9 @@ def effects_at(output: Output, plant: Plant) -> list[Effect]:
                             note=f"{name} is recorded late by a dead time"))  # fmt: skip
     states, note = (State("lagging", output.unit, lagging_rate, start_speed),), f"{name} lags, first order"
     effects.append(declared(f"{name}_lag", output_lag.parameters, {port: lag_error}, states, note=note))
+    if output.unit == f"{length}/s":
+        mean = replace(output_average, name=f"{name}_average", adds={port: average_error}, binds={"omega": seen[0]})
+        effects.append(replace(mean, note=f"{name} is a mean over a time"))
     return effects
 
 
@@ -120,4 +126,31 @@ output_delay = Effect(
     note="the recorded speed is late by a dead time", source="Doebelin, Measurement Systems, chapter 3",
 )  # fmt: skip
 
-EFFECTS = (gyro_lag, gyro_bias, gyro_scale, output_lag, output_delay)
+
+# Below this window a part of the mean is taken, so that the null is the speed itself.
+SHORTEST_WINDOW_S = 1e-6
+
+
+def average_error(window, beyond, earlier, first, omega):
+    """Mean speed of the last T less the present one, w(0) + (z(t) - z(t - T)) / T - w(t), dz/dt = w - w(0)."""
+    return (beyond - earlier - window * (omega - first)) / np.maximum(window, SHORTEST_WINDOW_S)
+
+
+def beyond_first(omega, first):
+    """Rate of the way beyond that of the first speed, so that a machine in motion has a mean from the start."""
+    return omega - first
+
+
+def way_beyond(beyond):
+    """Return the way beyond that of the first speed."""
+    return beyond
+
+
+output_average = Effect(
+    name="output_average", adds={"output": average_error}, delays=(Delay("earlier", way_beyond, "window"),),
+    states=(State("beyond", "speed*s", beyond_first, zero), State("first", "speed", zero, start_speed)),
+    parameters=(Parameter("window", "s", 0.0, 0.2, null=0.0, note="over which counts or readings are taken"),),
+    note="the recorded speed is a mean over a time", source="doi:10.1109/41.161471",
+)  # fmt: skip
+
+EFFECTS = (gyro_lag, gyro_bias, gyro_scale, output_lag, output_delay, output_average)
