@@ -104,7 +104,6 @@ def test_a_parameter_among_the_constants_is_refused_with_the_key_to_write(run, r
 @pytest.mark.parametrize(("text", "words"), [
     ("time_s,drive_V\n0,1\n1,2\n", "a speed or an angle"), ("time_s,speed\n0,1\n1,2\n", "an input"),
     ("speed,drive\n1,1\n1,2\n", "no column of"), ("time_s,angle_counts,drive_V\n0,1,2\n1,2,3\n", "in counts"),
-    ("time_s,position_m,drive_N\n0,1,2\n1,2,3\n", "a position of a linear axis"),
     ("time_s,speed_rad_s,drive_V\n0,1,2\n", "a.csv: 1 samples in the record, at least 20 are expected"),
     ("time_s,angle_deg,velocity_m_s,drive_N_m\n0,1,2,3\n1,2,3,4\n", "moves straight and 'angle_deg' of one that turns"),
 ])  # fmt: skip
@@ -185,11 +184,14 @@ slide = Plant(
 """
 
 
-def test_a_position_of_a_linear_axis_is_what_the_plant_of_a_plug_in_reads(run, refused):
+def test_a_position_of_a_linear_axis_is_what_a_plant_of_armid_and_the_plant_of_a_plug_in_reads(run, refused):
     times, drive, _, angle = wheel(5)
     write(Path("a.csv"), "t_s,motor [mV],slide_mm", times, drive, angle)
     Path("slide.py").write_text(SLIDE)
-    assert "no plant for" in refused("new", "campaign", "none", "--from", "a.csv")
+    assert run("new", "campaign", "straight", "--from", "a.csv").code == 0
+    toml = tomllib.loads(Path("straight/campaign.toml").read_text())
+    assert (toml["plant"], toml["hold"]) == ("linear_axis", "zero")
+    assert run("check", "straight").code == 0
     assert run("new", "campaign", "mine", "--from", "a.csv", "--plugin", "slide.py:slide").code == 0
     toml = tomllib.loads(Path("mine/campaign.toml").read_text())
     assert (toml["inputs"], toml["hold"]) == ({"volts": "volts_V"}, "zero")
@@ -208,3 +210,12 @@ def test_a_file_whose_names_are_the_outputs_of_a_shipped_plant_is_of_that_plant(
     assert "not used" not in text
     signals = read_campaign(tmp_path / "shaft").train[0].signals
     assert [s.header for s in signals] == ["hub_angle_deg", "deflection_deg"]
+
+
+def test_units_in_one_word_are_read_as_such(run):
+    times, drive, speed, _ = wheel(5)
+    for name, header, factor in (("a", "turn_dps", "deg"), ("b", "turn_radps", "rad"), ("c", "way_mps", "m")):
+        write(Path(f"{name}.csv"), f"t_s,duty_pct,{header}", times, drive, speed)
+        assert run("new", "campaign", name, "--from", f"{name}.csv").code == 0
+        assert Path(f"{name}/{name}.csv").read_text().partition("\n")[0].endswith(f"_{factor}_s")
+        assert "its unit" not in Path(f"{name}/campaign.toml").read_text()

@@ -198,14 +198,14 @@ WORDS_OF_HEADERS = {
 # End of a unit -> seconds.
 SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 # Quantity, linear or not -> what its header begins with in a record, the ends of units that it may have, and the one
-# that is taken where the header has none. A turning machine takes its input in any unit, as `command`.
+# that is taken where the header has none. An input in another unit is a `command`.
 HEADERS = {
     ("speed", False): ("angular_velocity", tuple(SUFFIXES["rad/s"]), "rad_s"),
     ("speed", True): ("velocity", tuple(SUFFIXES["m/s"]), "m_s"),
     ("position", False): ("angle", tuple(SUFFIXES["rad"]), "rad"),
     ("position", True): ("position", tuple(SUFFIXES["m"]), "m"),
     ("drive", False): ("drive", ("V", "N_m", "A"), ""),
-    ("drive", True): ("drive", ("V", "N", "N_m", "A"), "V"),
+    ("drive", True): ("drive", ("V", "N", "A"), ""),
 }
 COMMAND, CURRENT = "command", "current_A"
 LINEAR, DRIVES = {*SUFFIXES["m"], *SUFFIXES["m/s"], "N"}, {"V", "A", "N", "N_m"}
@@ -222,7 +222,8 @@ KEPT = 0.5
 GUESSED_MODELS = {
     False: ('plant = "rotary_arm"  # GUESS: it turns; inertia, damping and the moment of gravity are searched,',
             "# all per unit of the drive, as the gain is 1: a known one goes into [parameters.gain] as `fixed`"),
-    True: ('plant = "driven_axis"  # GUESS: a linear axis', 'effects = ["viscous"]  # GUESS: its speed is braked'),
+    True: ('plant = "linear_axis"  # GUESS: it moves straight; mass and damping are searched, all per unit',
+           "# of the drive, as the gain is 1: a known one goes into [parameters.gain] as `fixed`"),
 }  # fmt: skip
 
 
@@ -249,9 +250,9 @@ def column_of(header: str) -> FileColumn:
         words, unit = apart[1], apart[2].strip()
         end = UNIT_ENDS.get(unit, "")
     else:
-        ends = {*UNIT_ENDS.values(), *SECONDS}
-        end = max((e for e in ends if header.endswith(f"_{e}") or header == e == "rpm"), key=len, default="")
-        words, unit = header.removesuffix(f"_{end}"), ""
+        ends = {end: end for end in (*UNIT_ENDS.values(), *SECONDS)} | UNIT_ENDS
+        last = max((e for e in ends if header.endswith(f"_{e}") or header == e == "rpm"), key=len, default="")
+        words, unit, end = header.removesuffix(f"_{last}"), "", ends.get(last, "")
     end, factor = DRIVEN_IN.get(unit or end, (end, 1.0))
     return FileColumn(header, words.strip().lower().replace(" ", "_"), end, "" if end else unit, factor)
 
@@ -328,11 +329,8 @@ def plant_of(table: CsvTable) -> Plant | None:
 
 
 def moves_straight(roles: Mapping[str, FileColumn], table: CsvTable) -> bool:
-    """Return whether a machine is a linear axis; refuse one that no plant of armid is, and units that are not known."""
+    """Return whether a machine is a linear axis; refuse one that moves straight and turns, and units not known."""
     linear = any(roles[q].end in LINEAR for q in roles if q != "time")
-    if linear and "speed" not in roles:
-        raise ArmidError(f"{table.where}: a position of a linear axis is there and no speed, which armid has no "
-                         "plant for: a speed, or a plant of your own by `armid new plant`, is expected")  # fmt: skip
     turns = [quoted(roles[q].header) for q in ("speed", "position") if q in roles and roles[q].end in TURNING_ENDS]
     if linear and turns:
         straight = next(quoted(c.header) for c in roles.values() if c.end in LINEAR)
@@ -340,8 +338,7 @@ def moves_straight(roles: Mapping[str, FileColumn], table: CsvTable) -> bool:
                          "that turns, which armid has no plant for: a plant of your own by `armid new plant` is "
                          "expected")  # fmt: skip
     for quantity, column in roles.items():
-        # the input of a turning machine may have any unit
-        ends = HEADERS[quantity, linear][1] if quantity != "time" and (linear or quantity != "drive") else ()
+        ends = HEADERS[quantity, linear][1] if quantity not in ("time", "drive") else ()
         if ends and (column.unit or (column.end and column.end not in ends)):
             known = [unit for unit, end in UNIT_ENDS.items() if end in ends and " " not in unit]
             raise ArmidError(f"{table.where}: the unit of {quoted(column.header)} is "
