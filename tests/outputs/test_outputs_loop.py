@@ -41,7 +41,10 @@ def test_the_missing_friction_is_named_the_rest_is_noise_and_the_start_held_out_
         assert np.sqrt(np.mean(residual**2)) == pytest.approx(noise, rel=0.1), replay.name
     piece = closed.campaign.holdout[0].pieces[0]
     assert (piece.n_spent, piece.window.start) == (35, 35)
-    assert closed.after.holdout.replays[0].pieces[0].manoeuvre.constants == piece.manoeuvre.constants
+    started = closed.after.holdout.replays[0].pieces[0]
+    for name, deviation in piece.start_deviation.items():
+        assert started.start_deviation[name] < deviation, "the model knows more of these samples than a curve does"
+        assert abs(started.manoeuvre.constants[name] - piece.manoeuvre.constants[name]) < 4.0 * deviation
     again = holdout_residuals(closed.after.fit, closed.campaign.holdout, closed.inference.exploration.library)
     np.testing.assert_array_equal(again.residual, closed.after.holdout.residual)
 

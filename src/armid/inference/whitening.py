@@ -267,15 +267,20 @@ def with_standstills(data: WhitenedData) -> WhitenedData:
 
 
 def standstill_columns(record: Record, level: NoiseModel, piece: int) -> Array:
-    """Return the rounding error of each long run of equal values of a piece, whitened, (n_samples, n_runs)."""
+    """Return the rounding error of each long run of equal values of a piece, and of a position the error of its zero.
+
+    Whitened, (n_samples, n_errors).
+    """
     n, sensor = record.lengths[piece], record.signals[0].sensor
     first = sum(record.lengths[:piece])
     standstills = runs(record.seen[first : first + n], FEWEST_REST_SAMPLES) if sensor.step else []
     columns = np.zeros((len(standstills), n))
     for column, (a, b) in zip(columns, standstills, strict=True):
         column[a:b] = sensor.rounding
+    if record.signals[0].zero_doubt:
+        columns = np.vstack([columns, np.full(n, record.signals[0].zero_doubt)])
     # scipy's filter refuses an empty array
-    return level.white(columns, [n]).T if standstills else columns.T
+    return level.white(columns, [n]).T if len(columns) else columns.T
 
 
 def whitened(records: Sequence[Record], plant: Plant, trained: WhitenedData | None = None) -> WhitenedData:

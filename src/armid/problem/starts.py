@@ -38,9 +38,9 @@ LEAST_NOISE = 1e-6
 def with_starts(replays: Sequence[Replay], candidate: Array) -> tuple[Replay, ...]:
     """Return replays whose pieces start where one whole candidate fits best, ready to correct others about there.
 
-    Pieces whose start was measured and is not to be fitted (of a record that is held out, or where noise of the inputs
-    counts) start where the candidate's outputs show what the reader saw. Gauss-Newton steps from the piece's own start
-    minimise
+    Pieces whose start was measured and is not to be fitted (where noise of the inputs counts) start where the
+    candidate's outputs show what the reader saw; those of a record that is held out from what its first samples tell,
+    which judge nothing. Gauss-Newton steps from the piece's own start minimise
 
     J(s) = |x - y(s)|^2 / (max(1, m) c) + |(s - s_reader) / 3 deviations|^2
 
@@ -154,13 +154,31 @@ class Start:
         outputs = prepared.run(population, self.ready.threads, constants).outputs
         return np.asarray(outputs[list(self.places)])
 
+    @cached_property
+    def zeros(self) -> list[Array]:
+        """What the zero of each counting sensor does, over the noise, as far as it is in doubt, (n_seen,) each."""
+        edges = np.cumsum([0, *(len(s.seen(self.piece)) for s in self.ready.record.signals)])
+        doubts = [s.zero_doubt for s in self.ready.record.signals]
+        columns = [np.zeros(len(self.weights)) for _ in doubts]
+        for column, doubt, a, b in zip(columns, doubts, edges, edges[1:], strict=False):
+            column[a:b] = doubt * self.weights[a:b]
+        return [column for column in columns if column.any()]
+
+    def white(self, seen: Array) -> Array:
+        """Return what is seen over the noise, (..., n_seen), over that and the doubt of the zeros together."""
+        for column in self.zeros:
+            size = float(np.linalg.norm(column))
+            share = (1.0 - 1.0 / np.hypot(1.0, size)) / size**2
+            seen = seen - share * (seen @ column)[..., np.newaxis] * column
+        return seen
+
     def seen(self, signals: Array) -> Array:
         """Return what is seen in the windows over the noise, the outputs one behind the other, (n_candidates, n)."""
         pairs = zip(signals, self.samples, strict=True)
-        return np.asarray(self.weights * np.concatenate([signal[:, samples] for signal, samples in pairs], axis=1))
+        return self.white(self.weights * np.concatenate([signal[:, samples] for signal, samples in pairs], axis=1))
 
     def residual(self, signals: Array) -> Array:
-        return np.asarray(self.weights * self.measured - self.seen(signals))
+        return np.asarray(self.white(self.weights * self.measured) - self.seen(signals))
 
     def linear(self, constants: Array, population: Array) -> tuple[Array, Array]:
         """Return signals and d signal / d constant about one start, all in one population, by central differences."""
@@ -202,8 +220,31 @@ class Start:
     def placed(self, candidate: Array) -> Piece:
         """Return the piece from the start that belongs to a candidate, see `with_starts`."""
         if not self.piece.shown_start:
-            return self.read(candidate)
+            return self.from_spent(candidate) if self.piece.n_spent and self.names else self.read(candidate)
         return self.held(candidate) if self.piece.smoothed else self.fitted(candidate)
+
+    def from_spent(self, candidate: Array) -> Piece:
+        """Return a piece that is held out from the start at which a candidate meets the samples that judge nothing.
+
+        A curve through them knows nothing of how the machine moves. The doubt is that of the same fit.
+        """
+        read = self.read(candidate)
+        shown = {name: read.manoeuvre.constants[name] for name in self.names}
+        start = self.with_piece(replace(read, window=slice(0, read.n_spent), shown_start=shown))
+        found = start.with_piece(start.fitted(candidate))
+        signals, slopes = found.linear(found.constants, candidate[np.newaxis])
+        residual, seen = found.residual(signals)[0], found.seen_slopes(slopes)[:, 0]
+        if not (np.isfinite(residual).all() and np.isfinite(seen).all()):
+            return read
+        misfit = found.misfit(residual, seen)
+        doubt = np.sqrt(np.diag(np.linalg.inv(seen @ seen.T / misfit + np.diag(found.shown[1] ** -2.0))))
+        fitted = read.with_constants(dict(zip(self.names, map(float, found.constants), strict=True)))
+        return replace(fitted, start_deviation=dict(zip(self.names, map(float, doubt), strict=True)))
+
+    def with_piece(self, piece: Piece) -> "Start":
+        record = self.ready.record
+        pieces = tuple(piece if i == self.index else other for i, other in enumerate(record.pieces))
+        return replace(self, ready=replace(self.ready, record=replace(record, pieces=pieces)))
 
     def held(self, candidate: Array) -> Piece:
         """Return the piece from where the candidate's outputs show what the reader saw, as it is where it diverges.
@@ -248,8 +289,8 @@ class Start:
 
     def corrected(self, constants: Array, slopes: Array, gain: Array, offset: Array) -> Piece:
         """Return the piece from one start, with how far others move it from there; gain: of samples over the noise."""
-        correction = StartCorrection(self.places, slopes[:, :, 0], gain * self.weights, offset, self.measured,
-                                     self.samples)  # fmt: skip
+        gain = self.white(gain) * self.weights
+        correction = StartCorrection(self.places, slopes[:, :, 0], gain, offset, self.measured, self.samples)
         known = dict(zip(self.names, map(float, constants), strict=True))
         return replace(self.piece.with_constants(known), correction=correction)
 
