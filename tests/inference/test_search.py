@@ -10,7 +10,7 @@ import pytest
 
 from armid.inference import infer, moves, prepared, search
 from armid.inference.candidates import EffectKey
-from armid.inference.decisions import WINDOW
+from armid.inference.decisions import HOPELESS, WINDOW
 from armid.inference.evidence import expansion_of, forecast
 from armid.inference.kinds import effects, faults
 from armid.inference.kinds.hypothesis import Hypothesis, may_join
@@ -212,11 +212,20 @@ def test_what_was_only_forecast_is_fitted_before_it_counts(monkeypatch):
     assert asked == ["b", "a", "d"]
 
 
-def test_a_model_in_another_form_has_the_same_neighbours():
-    root, tanh = (frozenset([Hypothesis("effect", "a", form)]) for form in ("root", "tanh"))
+def test_a_model_in_another_form_that_is_as_probable_has_the_same_neighbours(monkeypatch):
+    root, tanh, sharp = (frozenset([Hypothesis("effect", "a", form)]) for form in ("root", "tanh", "sharp"))
     assert has_expanded_form(tanh, 1.0, [(root, 0.0)])
     assert not has_expanded_form(tanh, WINDOW + 1.0, [(root, 0.0)])
     assert not has_expanded_form(tanh, 1.0, [(tanh, 1.0), (model("b"), 0.0)])
+    # one that is less probable by more may hold beside it what the other makes up for
+    found = exploration({}, monkeypatch=monkeypatch)
+    found.forecasts = {root: []}
+    ranked = [(root, 0.0), (tanh, -1.0), (sharp, -HOPELESS + 1.0), (model("b"), -HOPELESS + 2.0)]
+    found.fits = {m: SimpleNamespace(records=SimpleNamespace(data=SimpleNamespace(cover=None))) for m, _ in ranked}
+    monkeypatch.setattr(found, "ranked", lambda: ranked)
+    assert next_model(found) == sharp
+    found.forecasts[sharp] = []
+    assert next_model(found) is None
 
 
 def test_where_more_than_noise_is_left_the_best_of_each_size_lead_on(monkeypatch):
@@ -228,6 +237,11 @@ def test_where_more_than_noise_is_left_the_best_of_each_size_lead_on(monkeypatch
         order.append("".join(sorted(h.name for h in one)))
     assert order == [*"abcdefg"[:BEAM], "xy"]
     assert next_model(exploration(posteriors, ["xy"], False, monkeypatch)) is None
+    # where none leads, one with an effect may show what another does
+    order = []
+    while (one := next_model(exploration({"": 0.0, **singles}, ["", *order], True, monkeypatch))) is not None:
+        order.append("".join(sorted(h.name for h in one)))
+    assert order == [*"abcdefg"[:BEAM]]
     large = "abcdefgh"
     assert len(large) == MOST_EFFECTS
     assert next_model(exploration({large: 0.0}, (), False, monkeypatch)) is None

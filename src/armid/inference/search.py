@@ -286,12 +286,13 @@ def next_model(exploration: Exploration) -> Hypotheses | None:
     ranked = exploration.ranked()
     best, top = ranked[0]
     expanded = [(m, value) for m, value in ranked if m in exploration.forecasts]
-    near = [m for m, value in ranked if value > top - WINDOW
+    near = [m for m, value in ranked if value > top - (HOPELESS if is_form_of(m, best) else WINDOW)
             and not (is_outdone(m, value, ranked) or has_expanded_form(m, value, expanded))]  # fmt: skip
     is_left = is_significant(exploration.fits[best]) and exploration.fits[best].records.data.cover is None
     if is_left and not exploration.is_led:
         plain = [m for m, _ in ranked if all(h.kind == "effect" for h in m)]
-        beam = [m for n in range(1, len(best) + 1) for m in [m for m in plain if len(m) == n][:BEAM]]
+        # an effect may show together with another only: those with one are expanded although none of them leads
+        beam = [m for n in range(1, max(len(best), 1) + 1) for m in [m for m in plain if len(m) == n][:BEAM]]
         near = [*near, *beam] if is_near(exploration) else [*beam, *near]
     return next((m for m in near if m not in exploration.forecasts and len(m) < MOST_EFFECTS), None)
 
@@ -299,10 +300,15 @@ def next_model(exploration: Exploration) -> Hypotheses | None:
 def has_expanded_form(model: Hypotheses, value: float, expanded: Sequence[tuple[Hypotheses, float]]) -> bool:
     """Tell whether an expanded model in the window has the same names in other forms: its neighbours are the same.
 
-    The model at which the search ends is expanded all the same.
+    The model at which the search ends is expanded all the same. Of forms that differ by more each has its own: what one
+    lacks another may hold.
     """
-    names = {h.public for h in model}
-    return any(m != model and {h.public for h in m} == names and other > value - WINDOW for m, other in expanded)
+    return any(m != model and is_form_of(m, model) and abs(other - value) < WINDOW for m, other in expanded)
+
+
+def is_form_of(model: Hypotheses, other: Hypotheses) -> bool:
+    """Tell whether a model has the names of another, whatever their forms."""
+    return {h.public for h in model} == {h.public for h in other}
 
 
 def is_outdone(model: Hypotheses, value: float, ranked: Sequence[tuple[Hypotheses, float]]) -> bool:
