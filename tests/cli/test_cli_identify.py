@@ -85,7 +85,7 @@ def test_effects_fitness_and_identifier_also_of_a_user_on_an_axis(identified, mi
     assert list(result["parameters"]) == ["mass", "coulomb.level", "coulomb.width", "viscous.slope"]
     assert [p["unit"] for p in result["parameters"].values()] == ["kg", "N", "m/s", "N s/m"]
     assert (result["fitness"], result["identifier"], result["used"]) == ("rmse", "evolution", 160)
-    assert result["fitness_value"] == result["error"]["train"]["rmse"]
+    assert result["fitness_value"] == pytest.approx(result["error"]["train"]["rmse"], rel=1e-12)
     assert result["error"]["holdout"] is None
     assert re.search(r"holdout: none +│ +│", text)
     assert "mm/s" in text

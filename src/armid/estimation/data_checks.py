@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from armid.engine import Calibration, Schedule, probes
 from armid.estimation.corrections import WIDER_BOUNDS, Correction, DataIssue, corrections, of_pieces, rms
-from armid.estimation.least_squares import WeightedRecords, descend, held_by_bound, with_fitted_starts
+from armid.estimation.least_squares import WeightedRecords, descend, with_fitted_starts
 from armid.model import Array, Manoeuvre, Model, Plant
 from armid.model.parameter import powers_of
 from armid.problem.problem import ReadyRecord, by_record
@@ -118,7 +118,7 @@ def roomy_space(
     campaign: Campaign, model: Model, bounds: Mapping[str, tuple[float, float]] | None = None,
     fixed: Mapping[str, float] | None = None,
 ) -> Space:  # fmt: skip
-    """Return the space of a model, eight times as wide for those strengths that a rough fit holds at their end.
+    """Return the space of a model, eight times as wide for those strengths that a rough fit takes beyond their range.
 
     The range of an effect's strength in the machine's scales is a size to expect, and no wall: what a motor's voltage
     brakes at full speed is all that it drives. One that the campaign or the user gave stays. Arguments as `space_of`.
@@ -131,9 +131,13 @@ def roomy_space(
     train = [shortened(filled(r), len(campaign.train)) for r in campaign.train]
     trial = DataTrial(model, space)
     train = [trial.thinned(r, len(train)) for r in train]
-    values = trial.problem(train).values(trial.fit(train)[0])
-    held = np.array(space.free_names)[held_by_bound(space, values) & (values != 0.0)].tolist()
-    return space.with_wider(sized & set(held))
+    z, error = trial.fit(train)
+    roomy = DataTrial(model, space.with_wider(sized))
+    problem = roomy.problem(train)
+    beyond, less = roomy.fit(train, problem.shares(trial.problem(train).values(z))[None])
+    found = dict(zip(space.free_names, problem.values(beyond), strict=True))
+    low, high = (dict(zip(space.names, ends, strict=True)) for ends in (space.low, space.high))
+    return space.with_wider({n for n in sized if less < error and not low[n] <= found[n] <= high[n]})
 
 
 def filled(record: Record) -> Record:
