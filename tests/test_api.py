@@ -31,7 +31,7 @@ from synthetic import wheel, write_records
 
 QUICK = {"effects": ["viscous"], "budget": 60}
 # Where a word is near none that is known.
-OWN = "one of your own is a plug-in: the option plugin takes FILE.py:NAME"
+OWN = "one of your own is a plug-in: the option plugin takes FILE.py:NAME, in Python plugins a list of them"
 
 
 @pytest.fixture(scope="module")
@@ -62,6 +62,15 @@ def test_a_strength_beyond_its_declared_range_is_found_unless_the_range_was_give
     with pytest.warns(UserWarning, match=r"viscous\.slope may lie outside the range that was searched"):
         held = armid.identify(folder, identifier="least_squares", bounds={"viscous.slope": (0.0, high)}, interval=False)
     assert held.parameters["viscous.slope"].value == pytest.approx(high)
+
+
+def test_what_is_no_model_and_no_effect_is_refused(axis):
+    with pytest.raises(armid.ModelError, match="model is 'driven_axis': a Model is expected"):
+        armid.identify(axis, model="driven_axis")
+    with pytest.raises(armid.ModelError, match="'viscous' is added to a model: an Effect is expected"):
+        armid.read_campaign(axis).model() + "viscous"
+    with pytest.raises(armid.ArmidError, match="within is 5: a share between 0 and 1 is expected"):
+        armid.close_loop(axis, within=5)
 
 
 def annealing(value, low, high, budget, random, start=None, step=0.1):

@@ -129,11 +129,18 @@ def test_a_name_that_is_ours_or_that_of_another_plug_in_is_refused(own, attribut
         load_registry([f"{own}:effect", f"{own}:{attribute}"])
 
 
+IMPORTED = "from armid import Constant, Input, Parameter, Plant, Scales"
+
+
 @pytest.mark.parametrize(("text", "fragment"), [
     ("raise RuntimeError('no luck')", "RuntimeError: no luck"), ("def broken(:", "SyntaxError"),
     ("import not_there_at_all", "ModuleNotFoundError: No module named 'not_there_at_all'"),
     ("raise SystemExit(0)", "SystemExit: 0"),
-    ("from armid import Parameter\nParameter('a b', '1', 0, 1)", "parameter 'a b' is not a usable name"),
+    ("from armid import Parameter\nParameter('a b', '1', 0, 1)", "line 2: parameter 'a b' is not a usable name"),
+    (f"{IMPORTED}\nParameter('a', '1', '0', 1)", "line 2: parameter 'a' has low '0': a number is expected"),
+    (f"{IMPORTED}\nConstant('c', 1.0, '1', tolerance=2)", "tolerance 2: a share from 0 to below 1 is"),
+    (f"{IMPORTED}\nInput('u', 'V', ('drive_V'))", "columns: 'drive_V' stands alone, a tuple is"),
+    (f"{IMPORTED}\nPlant('p', Parameter('a', '1', 0, 1), (), Scales(1, 1))", "one Parameter stands alone"),
 ])  # fmt: skip
 def test_a_file_that_fails_is_refused(tmp_path, text, fragment):
     (tmp_path / "failing.py").write_text(text)

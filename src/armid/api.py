@@ -74,6 +74,8 @@ def opened(
             raise ArmidError(f"units is {quoted(units)}: {nearest(str(units), ANGLES)}")
         read = replace(read, angle=units)
     effects_known = registry.effects_for(read.plant)
+    if model is not None and not isinstance(model, Model):
+        raise ModelError(f"model is {quoted(model)}: a Model is expected; plant= names a plant")
     if model is None:
         for text in read.effects:
             chosen(effect_name(text), {**sensor_effects(read.declared), **effects_known}, "effect")
@@ -387,8 +389,8 @@ def close_loop(
     values = {**(fixed or {}), **(fix or {})}
     chances = {name: float(p) for name, p in (priors or {}).items() if not isinstance(p, Sequence)}
     known_too = with_known(read, {name: p for name, p in (priors or {}).items() if name not in chances})
-    if within is not None and not (isfinite(within) and within > 0.0):
-        raise ArmidError(f"within is {within:g}: a number above 0 is expected")
+    if within is not None and not 0.0 < within < 1.0:
+        raise ArmidError(f"within is {within:g}: a share between 0 and 1 is expected, 0.05 for 5 %")
     share = {} if within is None else {"within": within}
     file = progress if isinstance(progress, Path) else None
     with status_line(progress is True) as shown, angles_in(known_too.angle):

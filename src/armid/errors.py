@@ -107,7 +107,8 @@ def refuse_unless_known(word: str, known: Collection[str], found: str) -> None:
 def nearest_registered(word: str, known: Iterable[str]) -> str:
     """Return `nearest` among what plug-ins add to; where none is near, how one of the user's own is named."""
     hint = nearest(word, known)
-    return hint if hint.endswith("?") else f"{hint}; one of your own is a plug-in: the option plugin takes FILE.py:NAME"
+    own = "one of your own is a plug-in: the option plugin takes FILE.py:NAME, in Python plugins a list of them"
+    return hint if hint.endswith("?") else f"{hint}; {own}"
 
 
 BRIEF = reprlib.Repr()

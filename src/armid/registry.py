@@ -140,7 +140,7 @@ def load_plugin(plugin: str) -> tuple[str, str, Any]:
         raise ArmidError(f"plug-in '{plugin}': there is no file {file}")
     module = load_file(file)
     if not hasattr(module, attribute):
-        names = [n for n in vars(module) if not n.startswith("_")]
+        names = [n for n, own in vars(module).items() if any(accepts(own) for accepts in ACCEPTS.values())]
         raise ArmidError(f"plug-in '{plugin}': {file.name} has no '{attribute}', {nearest(attribute, names)}")
     thing = getattr(module, attribute)
     return kind_of(thing, f"plug-in '{plugin}'"), name_of(thing, attribute), thing
@@ -170,9 +170,10 @@ def load_file(file: Path) -> Any:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:
         del sys.modules[name]
+        where = f"plug-in {place_in_plugin(error) or file}"
         if isinstance(error, ArmidError):
-            raise
-        raise ArmidError(f"plug-in {file} fails when it is read: {type(error).__name__}: {error}") from error
+            raise type(error)(f"{where}: {error}") from error
+        raise ArmidError(f"{where}: it fails when it is read: {type(error).__name__}: {error}") from error
     return module
 
 

@@ -394,6 +394,8 @@ def log_of(inference: Inference) -> list[dict[str, Any]]:
 
 
 FREED, LEFT_OUT = "freed", "left_out"
+# Unit of a change that is a share of the parameter's value.
+OF_VALUE = "of its value"
 
 
 def record_faults_of(accused: Sequence[Hypothesis], model: Hypotheses, inference: Inference) -> list[RecordFault]:
@@ -417,7 +419,7 @@ def fault_of(hypothesis: Hypothesis, fit: Fit, inference: Inference) -> RecordFa
 def change_of(hypothesis: Hypothesis, fit: Fit, inference: Inference) -> RecordFault:
     what: OfParameter = hypothesis.means
     change: Any = next(f.unknown.moved for f in fit.others if f.unknown.name == hypothesis.size_name)
-    unit = "of its value" if what.product is not None else fit.model.parameters[what.name].unit
+    unit = OF_VALUE if what.product is not None else fit.model.parameters[what.name].unit
     kind = "parameter" if what.file else "trend"
     record = next((r for r in fit.records.data.records if r.file == what.file), fit.records.data.records[-1])
     likely = inference.posterior.of_kind(hypothesis.kind)
@@ -462,13 +464,7 @@ def fault_sentence(s: RecordFault) -> str:
     if s.kind == "label" or s.value is None or s.low is None or s.high is None:
         return f"{s.record} looks like a record of another load, or of other inputs than it tells."
     if s.parameter:
-        grew, (low, high) = ("larger" if s.value > 0.0 else "smaller"), along(s.value, s.low, s.high)
-        size = sized(factor * abs(s.value), factor * low, factor * high, unit)
-        changed = f"{' or '.join(s.parameter.split(', '))} is {size} {grew}"
-        if s.kind == "parameter":
-            return f"{s.record}: {changed} in it than in the other records; corrected."
-        return (f"{changed} in {s.record}, the last record, than in the first, and changes from each to the next, as "
-                "in a machine that warms up, wears or runs in; corrected.")  # fmt: skip
+        return change_sentence(s, s.value, s.low, s.high)
     if s.kind == "late":
         word = "late" if s.value > 0.0 else "early"
         low, high = along(s.value, 1e3 * s.low, 1e3 * s.high)
@@ -477,6 +473,20 @@ def fault_sentence(s: RecordFault) -> str:
     where = f"{s.record}, {s.output}" if s.output else s.record
     size = sized(factor * s.value, factor * s.low, factor * s.high, unit)
     return f"{where}: {OFF_BY[s.kind]} {size}; corrected."
+
+
+def change_sentence(s: RecordFault, value: float, low: float, high: float) -> str:
+    names, (factor, unit) = " or ".join(s.parameter.split(", ")), shown(1.0, s.unit)
+    factor, unit = (100.0, " %") if s.unit == OF_VALUE else (factor, behind(unit))
+    turns = s.unit == OF_VALUE and low <= -2.0 <= high
+    grew, (low, high) = ("larger" if value > 0.0 else "smaller"), along(value, low, high)
+    changed = f"{names} is {sized(factor * abs(value), factor * low, factor * high, unit)} {grew}"
+    if s.kind == "trend":
+        return (f"{changed} in {s.record}, the last record, than in the first, and changes from each to the next, as "
+                "in a machine that warms up, wears or runs in; corrected.")  # fmt: skip
+    if turns:
+        changed = f"as where an input or a sensor is inverted, {names} has the other sign"
+    return f"{s.record}: {changed} in it than in the other records; corrected."
 
 
 def sized(value: float, low: float, high: float, unit: str) -> str:

@@ -33,6 +33,8 @@ class Model:
         _ = self.graph
 
     def __add__(self, effect: Effect) -> "Model":
+        if not isinstance(effect, Effect):
+            raise ModelError(f"{effect!r} is added to a model: an Effect is expected, as armid.EFFECTS['coulomb']")
         return replace(self, effects=(*self.effects, effect))
 
     @caused_by(ModelError)

@@ -6,6 +6,7 @@ import re
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import Any
 
 from armid.errors import ModelError, nearest
@@ -17,6 +18,13 @@ def check_name(name: str, what: str) -> None:
         raise ModelError(f"{what} 'time' cannot have this name: in the equations, time is the time [s]")
     if not name.isidentifier() or keyword.iskeyword(name) or "__" in name or name != name.strip("_"):
         raise ModelError(f"{what} '{name}' is not a usable name: letters, digits and single underscores are expected")
+
+
+def check_numbers(what: str, **values: Any) -> None:
+    """Refuse what stands where a number is expected; None is passed over."""
+    for word, value in values.items():
+        if value is not None and (isinstance(value, bool) or not isinstance(value, Real)):
+            raise ModelError(f"{what} has {word} {value!r}: a number is expected")
 
 
 @dataclass(frozen=True)
@@ -44,6 +52,8 @@ class Parameter:
 
     def __post_init__(self) -> None:
         check_name(self.name, "parameter")
+        numbers = {word: getattr(self, word) for word in ("low", "high", "null", "fixed", "nominal")}
+        check_numbers(f"parameter '{self.name}'", **numbers)
         if not self.low < self.high:
             raise ModelError(f"parameter '{self.name}' has low {self.low} and high {self.high}: low < high is expected")
 

@@ -4,13 +4,14 @@ import math
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from inspect import signature
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armid.errors import ModelError, nearest
 from armid.model.effect import Equation, Guard, State, check_equation
-from armid.model.parameter import Parameter, Scales, check_name
+from armid.model.parameter import Parameter, Scales, check_name, check_numbers
 from armid.units import SUFFIXES
 
 Array = NDArray[np.float64]
@@ -94,6 +95,13 @@ class Manoeuvre:
         return self.interval, self.n_samples, self.hold, tuple(sorted(self.constants.items())), inputs
 
 
+def check_tuple(several: Any, where: str) -> None:
+    """Refuse one thing where several are expected: a comma in brackets is easily forgotten."""
+    if isinstance(several, str) or not isinstance(several, Iterable):
+        alone = repr(several) if isinstance(several, str) else f"one {type(several).__name__}"
+        raise ModelError(f"{where}: {alone} stands alone, a tuple is expected, with a comma behind it")
+
+
 @dataclass(frozen=True)
 class Constant:
     """Declare a known quantity with its default value, SI.
@@ -113,6 +121,12 @@ class Constant:
 
     def __post_init__(self) -> None:
         check_name(self.name, "constant")
+        check_numbers(
+            f"constant '{self.name}'", value=self.value, tolerance=self.tolerance, low=self.low, high=self.high
+        )
+        if self.tolerance is not None and not 0.0 <= self.tolerance < 1.0:
+            raise ModelError(f"constant '{self.name}' has the tolerance {self.tolerance:g}: a share from 0 to below 1 "
+                             "is expected, 0.02 for 2 %")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -139,6 +153,7 @@ class Input:
 
     def __post_init__(self) -> None:
         check_name(self.name, "input")
+        check_tuple(self.columns, f"input '{self.name}', columns")
         if self.hold not in ("", "linear", "zero"):
             raise ModelError(f"input '{self.name}' has the hold '{self.hold}': 'linear', 'zero' or '' is expected")
         if self.typical is not None and not self.typical[0] < self.typical[1]:
@@ -279,6 +294,8 @@ class Plant:
 
     def __post_init__(self) -> None:
         check_name(self.name, "plant")
+        for word in ("parameters", "states", "constants", "inputs", "outputs"):
+            check_tuple(getattr(self, word), f"plant '{self.name}', {word}")
         self._fill_outputs()
         speeds = [s.unit for s in self.states if s.name == self.aliases.get("omega", "omega")]
         if speeds == ["m/s"] and self.scales.length_unit != "m":  # its author left the units of the scales as they are
