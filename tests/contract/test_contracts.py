@@ -47,14 +47,16 @@ def test_identifiers_of_other_libraries_keep_their_contract(name, monkeypatch):
     assert failures(check_identifier(IDENTIFIERS[name])) == []
 
 
-# All effects in one compiled model of a plant, all but one at their nulls.
+# All effects in one compiled model of a plant, all but one at their nulls. Each on the smallest plant that takes it: the
+# arm's equations are long to compile and to solve.
 @pytest.mark.slow
-@pytest.mark.parametrize("plant", [ARM, AXIS, PLANTS["flexible_link"]], ids=["arm", "axis", "link"])
+@pytest.mark.parametrize("plant", [AXIS, ARM, PLANTS["flexible_link"]], ids=["axis", "arm", "link"])
 def test_every_effect_keeps_its_contract(plant):
-    """On the axis those that make something late, an input there, and on the link those that the arm does not take."""
-    others = {} if plant is ARM else {name: e for name, e in applicable(EFFECTS, ARM).items() if not e.delays}
-    some = {name: e for name, e in applicable(EFFECTS, plant).items() if name not in others}
-    effects = [e for e in some.values() if plant.name != "flexible_link" or not e.delays]
+    smaller = {"shell_transfer_arm": [AXIS], "flexible_link": [AXIS, ARM]}.get(plant.name, [])
+    others = {name for one in smaller for name in applicable(EFFECTS, one)}
+    # the hard limit of the drive lies above what drives the axis in a trial
+    others ^= {"drive_saturation"} if plant in (ARM, AXIS) else set()
+    effects = [e for name, e in applicable(EFFECTS, plant).items() if name not in others]
     found = list(check_effects(effects, {plant.name: plant}))
     documented = {f.sentence for _, f in found if f.name.startswith("documented")}
     assert documented == {"every function has a docstring"}
