@@ -47,8 +47,8 @@ def test_identifiers_of_other_libraries_keep_their_contract(name, monkeypatch):
     assert failures(check_identifier(IDENTIFIERS[name])) == []
 
 
-# All effects in one compiled model of a plant, all but one at their nulls. Each on the smallest plant that takes it: the
-# arm's equations are long to compile and to solve.
+# The effects in one compiled model of a plant, all but one at their nulls. Each on the smallest plant that takes it:
+# the arm's equations are long to compile and to solve.
 @pytest.mark.slow
 @pytest.mark.parametrize("plant", [AXIS, ARM, PLANTS["flexible_link"]], ids=["axis", "arm", "link"])
 def test_every_effect_keeps_its_contract(plant):

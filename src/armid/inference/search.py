@@ -286,7 +286,8 @@ def next_model(exploration: Exploration) -> Hypotheses | None:
     ranked = exploration.ranked()
     best, top = ranked[0]
     expanded = [(m, value) for m, value in ranked if m in exploration.forecasts]
-    near = [m for m, value in ranked if value > top - (HOPELESS if is_form_of(m, best) else WINDOW)
+    reach = HOPELESS if is_near(exploration) else WINDOW
+    near = [m for m, value in ranked if value > top - (reach if is_form_of(m, best) else WINDOW)
             and not (is_outdone(m, value, ranked) or has_expanded_form(m, value, expanded))]  # fmt: skip
     is_left = is_significant(exploration.fits[best]) and exploration.fits[best].records.data.cover is None
     if is_left and not exploration.is_led:
