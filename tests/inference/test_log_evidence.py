@@ -21,7 +21,7 @@ from armid.inference.evidence import (
 )
 from armid.inference.kinds.hypothesis import Hypothesis, Proposal
 from armid.inference.posterior import Atom, Posterior, most_odds, truncated
-from armid.inference.whitening import Cover
+from armid.problem.cover import Cover
 
 N, RNG = 60, np.random.default_rng(11)
 JACOBIAN, OTHERS = RNG.normal(size=(N, 2)), RNG.normal(size=(N, 1))

@@ -129,7 +129,9 @@ def test_the_number_of_teeth_is_looked_for_wherever_it_lies(tmp_path):
     places, among = waves_tried(fit, problem, key, library.declared_ranges(problem.model, key))
     travel = max(np.ptp(r.measured) for r in records.train)
     assert np.abs(places["torque_ripple.waves"] - WAVES).min() < np.pi / travel
-    assert len(places["torque_ripple.waves"]) * among > 13.0
+    low, high = (ends[problem.space.index("torque_ripple.waves")] for ends in (problem.space.low, problem.space.high))
+    looked_at = len(places["torque_ripple.waves"]) * among
+    assert looked_at == pytest.approx((high - low) * travel / np.pi, abs=1.0)
 
 
 def turning(x, fed):

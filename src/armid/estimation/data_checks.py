@@ -135,9 +135,9 @@ def roomy_space(
     roomy = DataTrial(model, space.with_wider(sized))
     problem = roomy.problem(train)
     beyond, less = roomy.fit(train, problem.shares(trial.problem(train).values(z))[None])
-    found = dict(zip(space.free_names, problem.values(beyond), strict=True))
-    low, high = (dict(zip(space.names, ends, strict=True)) for ends in (space.low, space.high))
-    return space.with_wider({n for n in sized if less < error and not low[n] <= found[n] <= high[n]})
+    found = problem.values(beyond)
+    outside = (found < space.low[space.free]) | (found > space.high[space.free])
+    return space.with_wider(sized & set(np.array(space.free_names)[outside].tolist())) if less < error else space
 
 
 def filled(record: Record) -> Record:

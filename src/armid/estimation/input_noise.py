@@ -15,6 +15,7 @@ from scipy.linalg import cho_solve_banded, cholesky_banded
 from scipy.ndimage import uniform_filter1d
 
 from armid.model import Array
+from armid.problem.cover import SMALLEST_SEEN
 from armid.problem.problem import ReadyRecord, Replay, by_record
 from armid.record import Piece, Record
 from armid.record.sensor import InputNoise, Mask, length_of_rest
@@ -27,9 +28,8 @@ SHARING, ROUNDS = 9, 40
 CHANGE, BEND = (-1.0, 1.0), (1.0, -2.0, 1.0)
 # Least variance of a difference, in that of the noise: what is held more tightly a fine sensor would show to be wrong.
 STRAIGHTEST = 1e-5
-# Cosines that are tried at once, and at most: fast errors move a machine least. Sum of squares, in units of the noise,
-# from which on samples see a signal.
-AT_ONCE, MOST_COSINES, SMALLEST_SEEN = 16, 1024, 0.1
+# Cosines that are tried at once, and at most: fast errors move a machine least.
+AT_ONCE, MOST_COSINES = 16, 1024
 # What rounding may add to a correlation.
 ROUNDING_OF_CORRELATION = 1e-9
 

@@ -21,6 +21,7 @@ from armid.inference.model import Fit, beyond, decomposed
 from armid.inference.whitening import WhitenedData, WhiteRecords, whitened, with_answers
 from armid.model import Array, Model
 from armid.model.effects.sensor import average_error
+from armid.problem.cover import Cover
 from armid.problem.problem import Replay, with_each
 from armid.problem.starts import with_starts
 from armid.record import Record
@@ -149,10 +150,8 @@ class Residuals:
 
     def window(self, replay: Replay) -> int:
         """Return over how many samples the model holds an output to be the mean, 0 where it does not."""
-        port, values = (
-            self.model.plant.outputs[replay.place].port,
-            dict(zip(self.model.parameters, self.candidate, strict=True)),
-        )
+        port = self.model.plant.outputs[replay.place].port
+        values = dict(zip(self.model.parameters, self.candidate, strict=True))
         means = [e for e in self.model.effects if e.adds.get(port) is average_error]
         return round(values[f"{means[0].name}.window"] / replay.record.spacing) if means else 0
 
@@ -298,9 +297,7 @@ def holdout_residuals(fit: Fit, records: tuple[Record, ...], library: Library) -
     spread = np.column_stack([spread, *starts])
     # A simulation that diverges there is not held to any doubt.
     spread = spread[:, np.isfinite(residual).all() & np.isfinite(spread).all(axis=0)]
-    base, sizes, _ = np.linalg.svd(spread, full_matrices=False)
-    left = residual - base @ ((1.0 - 1.0 / np.sqrt(1.0 + sizes**2)) * (base.T @ residual))
-    left = left + assumed_noise(data)
+    left = Cover.of(spread).white(residual) + assumed_noise(data)
     return Residuals(data, ready, fit.candidate, np.asarray(left), np.empty((len(residual), 0)),
                      bool(within or starts), train_residuals(fit))  # fmt: skip
 

@@ -31,8 +31,9 @@ from armid.estimation.least_squares import (
 )
 from armid.estimation.least_squares import STEP as Z_STEP
 from armid.inference.model import ROUGHLY, Fit
-from armid.inference.whitening import Cover, WhiteRecords
+from armid.inference.whitening import WhiteRecords
 from armid.model import Array
+from armid.problem.cover import Cover
 from armid.problem.problem import ReadyRecord, signals_of_each, with_each
 from armid.problem.starts import fits_starts, with_shown_starts, with_starts
 

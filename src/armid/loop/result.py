@@ -476,11 +476,12 @@ def fault_sentence(s: RecordFault) -> str:
 
 
 def change_sentence(s: RecordFault, value: float, low: float, high: float) -> str:
-    names, (factor, unit) = " or ".join(s.parameter.split(", ")), shown(1.0, s.unit)
-    factor, unit = (100.0, " %") if s.unit == OF_VALUE else (factor, behind(unit))
-    turns = s.unit == OF_VALUE and low <= -2.0 <= high
+    """Tell by how much a parameter is another; a change of a share by -2 turns its sign."""
+    names, is_share = " or ".join(s.parameter.split(", ")), s.unit == OF_VALUE
+    factor, unit = (100.0, "%") if is_share else shown(1.0, s.unit)
+    turns = is_share and low <= -2.0 <= high
     grew, (low, high) = ("larger" if value > 0.0 else "smaller"), along(value, low, high)
-    changed = f"{names} is {sized(factor * abs(value), factor * low, factor * high, unit)} {grew}"
+    changed = f"{names} is {sized(factor * abs(value), factor * low, factor * high, behind(unit))} {grew}"
     if s.kind == "trend":
         return (f"{changed} in {s.record}, the last record, than in the first, and changes from each to the next, as "
                 "in a machine that warms up, wears or runs in; corrected.")  # fmt: skip

@@ -14,9 +14,11 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from armid.engine import probes
 from armid.model import Array
+from armid.problem.cover import Cover
 from armid.problem.problem import ReadyRecord, Replay, by_record, with_each
 from armid.problem.space import Space
 from armid.record import Piece
@@ -155,22 +157,17 @@ class Start:
         return np.asarray(outputs[list(self.places)])
 
     @cached_property
-    def zeros(self) -> list[Array]:
-        """What the zero of each counting sensor does, over the noise, as far as it is in doubt, (n_seen,) each."""
-        edges = np.cumsum([0, *(len(s.seen(self.piece)) for s in self.ready.record.signals)])
-        doubts = [s.zero_doubt for s in self.ready.record.signals]
-        columns = [np.zeros(len(self.weights)) for _ in doubts]
-        for column, doubt, a, b in zip(columns, doubts, edges, edges[1:], strict=False):
-            column[a:b] = doubt * self.weights[a:b]
-        return [column for column in columns if column.any()]
+    def zeros(self) -> Cover | None:
+        """What the zeros of counting sensors do, as far as they are in doubt; None where no sensor counts."""
+        signals = self.ready.record.signals
+        if not any(s.zero_doubt for s in signals):
+            return None
+        weights = np.split(self.weights, np.cumsum([len(s.seen(self.piece)) for s in signals[:-1]]))
+        return Cover.of(block_diag(*(s.zero_doubt * w[:, np.newaxis] for s, w in zip(signals, weights, strict=True))))
 
     def white(self, seen: Array) -> Array:
         """Return what is seen over the noise, (..., n_seen), over that and the doubt of the zeros together."""
-        for column in self.zeros:
-            size = float(np.linalg.norm(column))
-            share = (1.0 - 1.0 / np.hypot(1.0, size)) / size**2
-            seen = seen - share * (seen @ column)[..., np.newaxis] * column
-        return seen
+        return seen if self.zeros is None else self.zeros.white(seen)
 
     def seen(self, signals: Array) -> Array:
         """Return what is seen in the windows over the noise, the outputs one behind the other, (n_candidates, n)."""
@@ -212,10 +209,13 @@ class Start:
     def answer(self, constants: Array, slopes: Array, misfit: float) -> tuple[Array, Array]:
         """Return gain and offset of a step, (n_constants, n_seen) and (n_constants,); misfit: that is left."""
         shown, width = self.shown
-        held = misfit / width**2
-        normal = slopes @ slopes.T + np.diag(held)
-        both = np.linalg.solve(normal, np.column_stack([slopes, held * (shown - constants)]))
+        pull = misfit / width**2 * (shown - constants)
+        both = np.linalg.solve(self.normal(slopes, misfit), np.column_stack([slopes, pull]))
         return np.asarray(both[:, :-1]), np.asarray(both[:, -1])
+
+    def normal(self, slopes: Array, misfit: float) -> Array:
+        """Return the matrix of the normal equations, times the misfit, (n_constants, n_constants)."""
+        return np.asarray(slopes @ slopes.T + np.diag(misfit / self.shown[1] ** 2))
 
     def placed(self, candidate: Array) -> Piece:
         """Return the piece from the start that belongs to a candidate, see `with_starts`."""
@@ -230,21 +230,21 @@ class Start:
         """
         read = self.read(candidate)
         shown = {name: read.manoeuvre.constants[name] for name in self.names}
-        start = self.with_piece(replace(read, window=slice(0, read.n_spent), shown_start=shown))
-        found = start.with_piece(start.fitted(candidate))
+        first = replace(read, window=slice(0, read.n_spent), shown_start=shown).until_window_end()
+        found = self.alone(self.alone(first).fitted(candidate))
         signals, slopes = found.linear(found.constants, candidate[np.newaxis])
         residual, seen = found.residual(signals)[0], found.seen_slopes(slopes)[:, 0]
         if not (np.isfinite(residual).all() and np.isfinite(seen).all()):
             return read
         misfit = found.misfit(residual, seen)
-        doubt = np.sqrt(np.diag(np.linalg.inv(seen @ seen.T / misfit + np.diag(found.shown[1] ** -2.0))))
+        doubt = np.sqrt(misfit * np.diag(np.linalg.inv(found.normal(seen, misfit))))
         fitted = read.with_constants(dict(zip(self.names, map(float, found.constants), strict=True)))
         return replace(fitted, start_deviation=dict(zip(self.names, map(float, doubt), strict=True)))
 
-    def with_piece(self, piece: Piece) -> "Start":
-        record = self.ready.record
-        pieces = tuple(piece if i == self.index else other for i, other in enumerate(record.pieces))
-        return replace(self, ready=replace(self.ready, record=replace(record, pieces=pieces)))
+    def alone(self, piece: Piece) -> "Start":
+        """Return the start of one piece, as if the record had no other."""
+        record, calibrations = replace(self.ready.record, pieces=(piece,)), (self.ready.calibrations[self.index],)
+        return Start(replace(self.ready, record=record, calibrations=calibrations), 0)
 
     def held(self, candidate: Array) -> Piece:
         """Return the piece from where the candidate's outputs show what the reader saw, as it is where it diverges.

@@ -526,7 +526,7 @@ def visits(values: Array, limit: float) -> list[tuple[int, int]]:
 def is_abrupt(values: Array, begin: int, end: int, least: float) -> bool:
     """Tell whether a signal reaches and leaves a stretch of equal values by so much within a few samples.
 
-    With which a record begins was not reached: a machine at an even speed leaves it so as its drive changes.
+    A stretch with which a record begins was not reached: as its drive changes, an even speed ends as abruptly.
     """
     sides = (values[max(begin - RUN_UP, 0) : begin], values[end : end + RUN_UP])
     away = [float(np.mean(np.abs(side - values[begin]))) for side in sides if side.size == RUN_UP]

@@ -17,8 +17,9 @@ from armid.inference.kinds.missing_signal import Segment, segments_about
 from armid.inference.library import Library
 from armid.inference.model import Fit, fit_from, unless_diverged
 from armid.inference.unknowns import Freed, freed
-from armid.inference.whitening import Cover, WhiteRecords
+from armid.inference.whitening import WhiteRecords
 from armid.model import Array
+from armid.problem.cover import Cover
 
 # Prior deviations: rms by which the signal moves all records, in units of the noise.
 SCALES_OF_SIGNAL = np.array([0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0])

@@ -14,8 +14,7 @@ from armid.model.plant import Output, Plant
 def sensor_effects(plant: Plant) -> dict[str, Effect]:
     """Return name -> bias, scale, delay and lag (`hub_angle_bias`) of each output that has a port of its own.
 
-    A speed has a mean over a window (`hub_speed_average`) as well: it is often counted, a position is read.
-
+    A speed, which is often counted, has a mean over a time as well (`hub_speed_average`).
     At `output` the library's own are added where `omega` is what is recorded. What the sensor sees is its signal
     without what is added at the port, where that is one state or quantity.
     """
