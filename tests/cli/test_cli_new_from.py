@@ -104,6 +104,7 @@ def test_a_parameter_among_the_constants_is_refused_with_the_key_to_write(run, r
 @pytest.mark.parametrize(("text", "words"), [
     ("time_s,drive_V\n0,1\n1,2\n", "a speed or an angle"), ("time_s,speed\n0,1\n1,2\n", "an input"),
     ("speed,drive\n1,1\n1,2\n", "no column of"), ("time_s,angle_counts,drive_V\n0,1,2\n1,2,3\n", "in counts"),
+    ("time_s,angle_deg,drive_V\n" + "".join(f"{i},,1\n" for i in range(30)), "'angle_deg' has 0 samples with a number"),
     ("time_s,speed_rad_s,drive_V\n0,1,2\n", "a.csv: 1 samples in the record, at least 20 are expected"),
     ("time_s,angle_deg,velocity_m_s,drive_N_m\n0,1,2,3\n1,2,3,4\n", "moves straight and 'angle_deg' of one that turns"),
 ])  # fmt: skip

@@ -303,6 +303,9 @@ def guessed_campaign(
         notes.append("counts of an encoder are an angle as angle_counts, with counts_per_turn in this file")
     for table in tables:
         check_number(len(table.lines), f"{table.file}:", "in the record")
+        for header in (old for old, new in renamed.items() if new not in drives):
+            told = int(np.isfinite(table.columns[header]).sum())
+            check_number(told, f"{table.file}: {quoted(header)} has", "with a number")
     # what the plant says of an input counts, whatever the file says
     known = {i.name for i in plant.inputs if i.hold} if plant is not None else set[str]()
     open_drives = [headers[i] for i in inputs if i not in known]
