@@ -4,7 +4,7 @@ simulate: a population through a manoeuvre, and quantities along a motion. calib
 generate, templates/kernel.py.jinja: the module of a model, its equations and the loop that integrates them.
 templates/history.py.jinja: the past of late states.
 transpile: the source of an equation, made self-contained. compile: the module, and what of it is kept on disk.
-simd, simd_math: vectors of candidates in numba, and their elementary functions.
+simd, simd_bundles, simd_math: vectors of candidates in numba, several of them as one, their elementary functions.
 """
 
 from armid.engine.calibrate import (

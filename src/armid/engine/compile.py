@@ -30,7 +30,7 @@ from numba.core.errors import NumbaError, UnsupportedBytecodeError
 from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
-from armid.engine import generate, simd, simd_math
+from armid.engine import generate, simd, simd_bundles, simd_math
 from armid.engine.generate import KernelParts, kernel_parts, kernel_text
 from armid.errors import ArmidError
 from armid.model import Model
@@ -203,7 +203,7 @@ def unusable(folder: Path) -> str:
 UNCOMPILABLE = (NumbaError, UnsupportedBytecodeError)
 Kernel = Callable[..., Any]
 # What a generated module is made by and compiled from.
-MADE_FROM = [*generate.TEMPLATES, *(Path(str(module.__file__)) for module in (generate, simd, simd_math))]
+MADE_FROM = [*generate.TEMPLATES, *(Path(str(module.__file__)) for module in (generate, simd, simd_bundles, simd_math))]
 KERNELS: WeakKeyDictionary[Model, Kernel] = WeakKeyDictionary()
 # Threads that ask for the same model at once share one kernel, which numba then compiles once.
 LOCK = RLock()

@@ -14,10 +14,12 @@ the neighbours do.
 """
 
 import ast
+import re
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from armid.engine.transpile import SourceText, local_name
 from armid.model import Model
@@ -32,15 +34,10 @@ LONGEST_SPAN = 8
 FEWEST_IDLE = 8
 # What a node of an effect is where the effect is not used; a guard never crosses 0.
 IDLE = {"term": 0.0, "late": 0.0, "rate": 0.0, "guard": 1.0}
+# The time is the one argument of the equations that stands for itself.
+TIME = {"v_time": ["v_time"]}
 TEMPLATE = Path(__file__).parent / "templates" / "kernel.py.jinja"
 TEMPLATES = (TEMPLATE, TEMPLATE.with_name("history.py.jinja"))
-# Prefixes of lists of names in the template.
-OF_STATES = ("a", "b", "m", "d", "e", "y", "k1", "k2", "k3", "k4", "fa", "fb")
-OF_INPUTS = ("ua", "um", "ub", "us", "uz", "u0", "u1", "ur", "p0", "p1")
-OF_CARRIED = ("n", "o", "r", "t")
-OF_OUTPUTS = ("rec",)
-OF_LATE_STATES = ("l", "ha", "hm", "hb", "hs", "hq", "hx", "w")
-OF_GUARDS = ("ga", "gb", "gm", "gd", "ge", "c")
 
 
 @dataclass(frozen=True)
@@ -61,10 +58,10 @@ class KernelParts:
     """Hold what the template is filled with: local names of one model, and its equations.
 
     equations: text of the functions `fixed_values`, `start_values`, `rates`, `guards`, `recorded` and what they call.
-    parameters, constants: what each candidate is given, in order. fixed: quantities that do not move, computed once.
-    states, inputs, latches: what moves, each in its order. outputs: recorded signals. latch_guards: the guard of each
-    latch; kinks: the other guards; jumping_guards: whether a kink may jump at a sample, as only inputs do. wide:
-    whether there are so many effects that what is rarely needed is compiled but once. delays: sums of parameters by
+    parameters, constants: what each candidate is given, in order. used: which effects any candidate of a group uses,
+    empty for so few effects that all are evaluated; where there are more, what is rarely needed is compiled but once.
+    states, inputs, latches: what moves, each in its order. outputs: recorded signals. kinks: guards that are not those
+    of latches. jumping_guards: whether a kink may jump at a sample, as only inputs do. delays: sums of parameters by
     which inputs and states are late; the motion sees the first n_moving of them, and they cut each sample interval
     where inputs drive it, as what is late jumps or bends there. late_inputs, late_states: what is late, by which delay.
     """
@@ -72,15 +69,13 @@ class KernelParts:
     equations: str
     parameters: list[str]
     constants: list[str]
-    fixed: list[str]
+    used: list[str]
     states: list[str]
     inputs: list[str]
     latches: list[str]
     outputs: list[str]
-    latch_guards: list[str]
     kinks: list[str]
     jumping_guards: bool
-    wide: bool
     delays: list[str]
     n_moving: int
     late_inputs: list[Late]
@@ -101,48 +96,25 @@ def kernel_text(parts: KernelParts) -> str:
         variable_start_string="{", variable_end_string="}", trim_blocks=True, lstrip_blocks=True,
         keep_trailing_newline=True, undefined=StrictUndefined, loader=FileSystemLoader(TEMPLATE.parent),
     )  # fmt: skip
-    environment.filters |= {"each": each, "listed": listed, "nested": nested}
-    states, inputs, latches, late_of = parts.states, parts.inputs, parts.latches, parts.late_states
-    guards = [*parts.latch_guards, *parts.kinks]
-    times = [f"time_of_{k}" for k in latches]
-    carried = [*latches, *times, *states, *(f"ga_{g}" for g in guards)]
-    late_states = [one.name for one in late_of]
-    driven = [*inputs, *(one.name for one in parts.late_inputs)]
-    prefixed = ((states, OF_STATES), (driven, OF_INPUTS), (parts.outputs, OF_OUTPUTS), (guards, OF_GUARDS),
-                (carried, OF_CARRIED), (late_states, OF_LATE_STATES))  # fmt: skip
-    lists = {prefix: listed(names, f"{prefix}_") for names, prefixes in prefixed for prefix in prefixes}
-    lists |= {
-        "x": listed(states), "x_n": listed(states, "n_"), "fixed": listed(parts.fixed),
-        "latches": listed(latches), "latches_n": listed(latches, "n_"), "times": listed(times),
-        "new": listed(latches, "new_"), "given": listed(parts.parameters + parts.constants),
-        "judging": f"judged, {listed(states, 'per_')}",
-    }  # fmt: skip
-    remembered = list(dict.fromkeys(one.of for one in late_of))
-    numbers = [str(i) for i in range(len(parts.delays))]
-    of_delays = [listed(numbers, f"{word}_") for word in ("late_by", "whole", "rest", "using")]
-    given = "delayed, history, steps_kept, place, per_part, part, edges, numbers, " + "".join(of_delays)
+    environment.filters |= {"listed": listed, "nested": nested}
+    late_of = parts.late_states
+    remembered = {one.place: one.of for one in late_of}
+    moving = {j for j in range(len(parts.delays)) if j < parts.n_moving}
+    count_of = Counter(one.delay for one in late_of)
     return environment.get_template(TEMPLATE.name).render(
-        vars(parts) | {"latch_names": latches} | lists, guards=guards, carried=carried, driven=driven,
-        late_names=late_states, block=BLOCK, max_cuts=MAX_CUTS, longest=LONGEST_SPAN,
-        switches=list(zip(latches, parts.latch_guards, strict=True)), remembered=remembered,
-        last_rates=listed(remembered, "k4_"), late_by=of_delays[0], late_by_names=[f"late_by_{i}" for i in numbers],
-        late_given=given if late_of else "", n_cutting=parts.n_moving if inputs else 0,
-        felt=sorted({one.delay for one in late_of if one.delay < parts.n_moving}),
-        delays_of_states={one.delay for one in late_of},
+        vars(parts), block=BLOCK, max_cuts=MAX_CUTS, longest=LONGEST_SPAN, wide=bool(parts.used),
+        guards=[*parts.latches, *parts.kinks], driven=[*parts.inputs, *(one.name for one in parts.late_inputs)],
+        remembered=[remembered[i] for i in sorted(remembered)], numbers_of_delays=range(len(parts.delays)),
+        count_of=count_of, delays_of_states=sorted(count_of), felt=sorted(moving & set(count_of)),
+        n_cutting=parts.n_moving if parts.inputs else 0,
     )  # fmt: skip
 
 
-def listed(names: list[str], prefix: str = "") -> str:
+def listed(names: Iterable[Any], prefix: str = "") -> str:
     return "".join(f"{prefix}{n}, " for n in names)
 
 
-def each(text: str, names: list[str], separator: str = "\n") -> str:
-    """Return the text for each name, `@` standing for it and `#` for its number; no lines are a `pass`."""
-    made = separator.join(text.replace("@", n).replace("#", str(i)) for i, n in enumerate(names))
-    return made or ("pass" if separator == "\n" else "")
-
-
-def nested(names: list[str], function: str, prefix: str) -> str:
+def nested(names: Sequence[Any], function: str, prefix: str) -> str:
     first = f"{prefix}{names[0]}" if names else ""
     return f"{function}(" * (len(names) - 1) + first + "".join(f", {prefix}{n})" for n in names[1:])
 
@@ -150,6 +122,14 @@ def nested(names: list[str], function: str, prefix: str) -> str:
 def variable(key: str) -> str:
     """Return the local name of a key; the prefix keeps a plant's `g` or `h` apart from the loop's own names."""
     return f"v_{key.replace('.', '__')}"
+
+
+def tuple_of(values: list[str]) -> str:
+    return f"({listed(values)})"
+
+
+def bundle_of(values: list[str]) -> str:
+    return f"bundle({tuple_of(values)})"
 
 
 def strengths_of(model: Model) -> dict[str, dict[str, float]]:
@@ -185,34 +165,37 @@ class Emitter:
         recorded = [o.signal for o in model.plant.outputs]
         fixed = self.fixed_keys([*rates, *guards, *recorded])
         delays, n_moving, late_inputs, late_states = self.late_leaves([*rates, *guards], recorded)
-        used = [f"{word}_{effect}" for effect in self.strengths for word in ("using", "used")]
-        lists: dict[str, Iterable[str]] = {
-            "parameters": model.parameters, "constants": model.constants, "fixed": fixed, "states": model.states,
-            "inputs": inputs, "latches": model.latches, "latch_guards": latch_guards, "kinks": kinks,
-        }  # fmt: skip
-        names = {name: [variable(k) for k in keys] for name, keys in lists.items()}
-        names["fixed"] += used
-        names["outputs"] = [o.name for o in model.plant.outputs]
-        given = [*names["parameters"], *names["constants"]]
+        using, used = ([f"{word}_{effect}" for effect in self.strengths] for word in ("using", "used"))
+        given = [variable(k) for k in (*model.parameters, *model.constants)]
         starts = [n.replace("rate__", "initial__", 1) for n in rates]
-        moving = [variable("time"), *names["latches"], *names["states"], *names["inputs"],
-                  *(one.name for one in (*late_inputs, *late_states)), *names["fixed"]]  # fmt: skip
+        names = {"states": model.states, "inputs": inputs, "latches": model.latches, "kinks": kinks}
+        named = {kind: [variable(k) for k in keys] for kind, keys in names.items()}
+        moving = {
+            "latches": named["latches"], "x": named["states"],
+            "u": [*named["inputs"], *(one.name for one in late_inputs)], "l": [one.name for one in late_states],
+            "fixed": [*map(variable, fixed), *using], "used": used,
+        }  # fmt: skip
+        if not late_states:
+            del moving["l"]
+        if not used:
+            del moving["used"]
         switches = [line for effect, nulls in self.strengths.items() for line in use_lines(effect, nulls)]
-        values = [f"1.0 * {variable(k)}" for k in fixed] + used
+        constant = bundle_of([variable(k) for k in fixed] + using)
         texts = [
-            self.function("fixed_values", given, self.assignments(fixed, True) + switches, values),
-            self.evaluation("start_values", [*given, variable("time"), *names["inputs"]], starts, True),
-            self.evaluation("rates", moving, rates),
-            self.evaluation("guards", moving, guards),
-            self.evaluation("recorded", moving, recorded),
-        ]
+            self.function("fixed_values", {"given": given}, self.assignments(fixed, True) + switches,
+                          f"{constant}, {tuple_of(used)}" if used else constant),
+            self.evaluation("start_values", {"given": given, **TIME, "u": moving["u"]}, starts, True),
+            *(self.evaluation(name, TIME | moving, keys)
+              for name, keys in (("rates", rates), ("guards", guards), ("recorded", recorded))),
+        ]  # fmt: skip
         if delays:
-            texts.append(self.function("delay_values", given, [], [f"{by} + 0.0" for by in delays]))
+            texts.append(self.function("delay_values", {"given": given}, [], bundle_of(delays)))
         equations = self.function_texts() + "\n\n".join(texts)
         jumping = bool(kinks) and self.uses(guards, [*inputs, *(n.key for n in self.graph.of_kind("late_input"))])
         return KernelParts(
-            equations, **names, jumping_guards=jumping, wide=bool(self.strengths), delays=delays, n_moving=n_moving,
-            late_inputs=late_inputs, late_states=late_states,
+            equations, [variable(k) for k in model.parameters], [variable(k) for k in model.constants], used=used,
+            outputs=[o.name for o in model.plant.outputs], **named, jumping_guards=jumping, delays=delays,
+            n_moving=n_moving, late_inputs=late_inputs, late_states=late_states,
         )  # fmt: skip
 
     def late_leaves(self, moving: list[str], recorded: list[str]) -> tuple[list[str], int, list[Late], list[Late]]:
@@ -231,7 +214,7 @@ class Emitter:
         states = list(dict.fromkeys(n.needs[0] for n in late if n.kind == "late_state"))
         made = {kind: [
             Late(variable(n.key), variable(n.needs[0]), known.index(n.needs[0]), by.index(n.by))
-            for n in late if n.kind == kind
+            for n in sorted(late, key=lambda n: by.index(n.by)) if n.kind == kind
         ] for kind, known in (("late_input", inputs), ("late_state", states))}  # fmt: skip
         n_moving = len({n.by for n in late if n.key in seen})
         delays = [" + ".join(map(variable, terms)) for terms in by]
@@ -300,13 +283,20 @@ class Emitter:
             self.sources.add(name, node.function)
         return f"{name}({', '.join(f'{local_name(argument)}={variable(bound)}' for argument, bound in node.arguments)})"
 
-    def evaluation(self, name: str, arguments: list[str], wanted: list[str], static: bool = False) -> str:
-        return self.function(name, arguments, self.assignments(wanted, static), [variable(k) for k in wanted])
+    def evaluation(
+        self, name: str, given: Mapping[str, list[str]], wanted: list[str], static: bool = False
+    ) -> str:  # fmt: skip
+        return self.function(name, given, self.assignments(wanted, static), bundle_of([variable(k) for k in wanted]))
 
-    def function(self, name: str, arguments: list[str], lines: list[str], results: list[str]) -> str:
-        result = f"({', '.join(results)}{',' if len(results) == 1 else ''})"
-        body = "\n".join(f"    {line}" for line in [*lines, f"return {result}"])
-        return f"@compiled\ndef {name}({', '.join(arguments)}):\n{body}\n"
+    def function(self, name: str, given: Mapping[str, list[str]], lines: list[str], result: str) -> str:
+        """Return the text of a function; given: argument -> names of what it holds, of which those in use are read."""
+        body = [*lines, f"return {result}"]
+        spoken = set(re.findall(r"\w+", "\n".join(body)))
+        for argument, names in given.items():
+            whole = argument if argument == "used" else f"parts({argument})"
+            known = [f"{n} = of_{argument}[{i}]" for i, n in enumerate(names) if n in spoken and argument != n]
+            body = [f"of_{argument} = {whole}", *known, *body] if known else body
+        return f"@compiled\ndef {name}({', '.join(given)}):\n" + "\n".join(f"    {line}" for line in body) + "\n"
 
     def function_texts(self) -> str:
         """Return the plain functions of plant and effects, those with control flow wrapped lane by lane."""

@@ -1,12 +1,16 @@
 """Vector of doubles for numba: one value per candidate, side by side in the registers of the processor.
 
-Every operation acts lane by lane, so a candidate's result does not depend on its neighbours. A function that compiled
-functions alone call is linked into them (`LINKED`), and never made executable by itself: numba makes machine code of
-each function with all that it calls, which is half of the time to compile a model with thirty effects.
+Every operation acts lane by lane, so a candidate's result does not depend on its neighbours. A bundle holds the lanes
+of several quantities, as of all states of a machine; an operation acts on each of them, and what is no bundle serves
+all. It is one variable to numba, whose time to compile grows with their number, and registers to the processor.
+
+A function that compiled functions alone call is linked into them (`LINKED`), and never made executable by itself: numba
+makes machine code of each function with all that it calls, which is half of the time to compile a model with thirty
+effects.
 """
 
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
 
@@ -104,6 +108,14 @@ class Lanes(types.Type):  # type: ignore[misc]
     """Numba type of doubles that are computed together."""
 
 
+class Bundle(types.Type):  # type: ignore[misc]
+    """Numba type of the lanes of several quantities."""
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        super().__init__(f"bundle{count}")
+
+
 LANES_TYPE = Lanes(f"lanes{LANE_WIDTH}")
 
 
@@ -115,13 +127,30 @@ class LanesModel(models.PrimitiveModel):  # type: ignore[misc]
         super().__init__(dmm, fe_type, VECTOR)
 
 
+@register_model(Bundle)
+class BundleModel(models.PrimitiveModel):  # type: ignore[misc]
+    """Store a bundle as an LLVM array of vectors, as numba does a tuple of lanes."""
+
+    def __init__(self, dmm: Any, fe_type: Bundle) -> None:
+        super().__init__(dmm, fe_type, ir.ArrayType(VECTOR, fe_type.count))
+
+
 def is_number(numba_type: Any) -> bool:
     return isinstance(numba_type, NUMBER_TYPES)
 
 
 def mixes_lanes(*given: Any) -> bool:
-    """Tell whether numba types are numbers and lanes, with lanes among them."""
-    return any(isinstance(t, Lanes) for t in given) and all(isinstance(t, (Lanes, *NUMBER_TYPES)) for t in given)
+    """Tell whether numba types are numbers, lanes and bundles of one size, with more than numbers among them."""
+    sizes = {t.count for t in given if isinstance(t, Bundle)}
+    several = [t for t in given if isinstance(t, (Lanes, Bundle))]
+    return len(sizes) < 2 and bool(several) and all(is_number(t) or t in several for t in given)
+
+
+def joint_type(*given: Any) -> Any:
+    """Return the type of what an operation makes of numbers, lanes and bundles, None where they do not fit."""
+    if not mixes_lanes(*given):
+        return LANES_TYPE if all(map(is_number, given)) else None
+    return next((t for t in given if isinstance(t, Bundle)), LANES_TYPE)
 
 
 def broadcast(builder: Any, value: Any) -> Any:
@@ -140,22 +169,44 @@ def to_lanes(context: Any, builder: Any, value: Any, numba_type: Any) -> Any:
 def vector_pointer(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
     """Return the pointer to lanes in a contiguous float64 array; the arguments begin with the array and an index."""
     i = context.cast(builder, arguments[1], signature.args[1], types.intp)
-    data = context.make_array(signature.args[0])(context, builder, arguments[0]).data
-    return builder.bitcast(builder.gep(data, [i], source_etype=DOUBLE), VECTOR.as_pointer())
+    return vector_at(builder, context.make_array(signature.args[0])(context, builder, arguments[0]).data, i)
+
+
+def vector_at(builder: Any, data: Any, place: Any) -> Any:
+    return builder.bitcast(builder.gep(data, [place], source_etype=DOUBLE), VECTOR.as_pointer())
 
 
 def on_lanes(compute: Callable[..., Any]) -> Callable[..., Any]:
-    """Return code whose arguments all become lanes; compute(builder, vectors...): its LLVM value."""
+    """Return code whose arguments become lanes; compute(builder, vectors...): LLVM value, for each in a bundle."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        values = zip(arguments, signature.args, strict=True)
-        return compute(builder, *(to_lanes(context, builder, v, t) for v, t in values))
+        pairs = list(zip(arguments, signature.args, strict=True))
+        alike = [None if isinstance(t, Bundle) else to_lanes(context, builder, v, t) for v, t in pairs]
+        result = signature.return_type
+        if not isinstance(result, Bundle):
+            return compute(builder, *alike)
+        made = []
+        for i in range(result.count):
+            vectors = (builder.extract_value(v, i) if x is None else x for x, (v, _) in zip(alike, pairs, strict=True))
+            made.append(compute(builder, *vectors))
+        return bundled(builder, made)
 
     return generate
 
 
-def elementwise(result: Any, compute: Callable[..., Any], *given: Any) -> tuple[Any, Callable[..., Any]]:
-    """Return signature and code of an intrinsic on lanes; result, given: numba types of what it returns and takes."""
+def bundled(builder: Any, vectors: Sequence[Any]) -> Any:
+    """Return the LLVM array of vectors."""
+    result = ir.Constant(ir.ArrayType(VECTOR, len(vectors)), ir.Undefined)
+    for i, vector in enumerate(vectors):
+        result = builder.insert_value(result, vector, i)
+    return result
+
+
+def elementwise(compute: Callable[..., Any], *given: Any) -> tuple[Any, Callable[..., Any]]:
+    """Return signature and code of an intrinsic on lanes or bundles; given: numba types of what it takes."""
+    result = joint_type(*given)
+    if result is None:
+        raise TypingError(f"numbers, lanes or bundles of one size are expected, not {', '.join(map(str, given))}")
     return result(*given), on_lanes(compute)
 
 
@@ -172,7 +223,7 @@ def load(typing_context, array, index):
 @intrinsic
 def splat(typing_context, number):
     """Return lanes that all hold a number."""
-    return elementwise(LANES_TYPE, lambda builder, x: x, number)
+    return elementwise(lambda builder, x: x, number)
 
 
 @intrinsic
@@ -234,7 +285,7 @@ class LanesOperator(AbstractTemplate):  # type: ignore[misc]
     """Type an operator for lanes with lanes and lanes with numbers."""
 
     def generic(self, given: Any, named: Any) -> Any:
-        return signature(LANES_TYPE, *given) if mixes_lanes(*given) else None
+        return signature(joint_type(*given), *given) if mixes_lanes(*given) else None
 
 
 def define_operator(python_operator: Any, compute: Callable[..., Any]) -> None:
@@ -243,7 +294,8 @@ def define_operator(python_operator: Any, compute: Callable[..., Any]) -> None:
     It is written into its caller: as a function it would have to be compiled for each pair of types.
     """
     infer_global(python_operator)(LanesOperator)
-    for pair in ((Lanes, Lanes), *((Lanes, n) for n in NUMBER_TYPES), *((n, Lanes) for n in NUMBER_TYPES)):
+    kinds = (Lanes, Bundle, *NUMBER_TYPES)
+    for pair in ((a, b) for a in kinds for b in kinds if {a, b} & {Lanes, Bundle}):
         lower_builtin(python_operator, *pair)(on_lanes(compute))
 
 
@@ -284,7 +336,7 @@ for _name, _symbol in COMPARISONS.items():
 
 @intrinsic
 def negate(typing_context, a):
-    return elementwise(a, lambda builder, x: builder.fneg(x, flags=FLAGS), a)
+    return elementwise(lambda builder, x: builder.fneg(x, flags=FLAGS), a)
 
 
 def vector_call(builder: Any, name: str, *vectors: Any) -> Any:
@@ -298,7 +350,7 @@ def unary(name: str) -> Any:
 
     @intrinsic
     def act(typing_context, a):
-        return elementwise(a, lambda builder, x: vector_call(builder, name, x), a)
+        return elementwise(lambda builder, x: vector_call(builder, name, x), a)
 
     return act
 
@@ -312,7 +364,7 @@ floor_of = unary("floor")
 @intrinsic
 def fused(typing_context, a, b, c):
     """Return a b + c with one rounding, never reordered."""
-    return elementwise(LANES_TYPE, lambda builder, *vectors: vector_call(builder, "fma", *vectors), a, b, c)
+    return elementwise(lambda builder, *vectors: vector_call(builder, "fma", *vectors), a, b, c)
 
 
 @intrinsic
@@ -322,7 +374,7 @@ def select(typing_context, a, b, x, y):
     def compute(builder, p, q, r, s):
         return builder.select(builder.fcmp_ordered(">", p, q), r, s)
 
-    return elementwise(LANES_TYPE, compute, a, b, x, y)
+    return elementwise(compute, a, b, x, y)
 
 
 @intrinsic
@@ -334,7 +386,7 @@ def any_above(typing_context, a, b):
         bits = builder.bitcast(builder.fcmp_ordered(">", x, limit), mask)
         return builder.icmp_unsigned("!=", bits, ir.Constant(mask, 0))
 
-    return elementwise(types.boolean, compute, a, b)
+    return types.boolean(a, b), on_lanes(compute)
 
 
 def whole(value: int) -> Any:
@@ -349,7 +401,7 @@ def two_to_the(typing_context, k):
         exponent = builder.add(builder.fptosi(x, WHOLE_NUMBERS), whole(1023))
         return builder.bitcast(builder.shl(exponent, whole(52)), x.type)
 
-    return elementwise(k, compute, k)
+    return elementwise(compute, k)
 
 
 @intrinsic
@@ -361,7 +413,7 @@ def mantissa_of(typing_context, x):
         kept = builder.and_(bits, whole(0x000FFFFFFFFFFFFF))
         return builder.bitcast(builder.or_(kept, whole(0x3FF0000000000000)), value.type)
 
-    return elementwise(x, compute, x)
+    return elementwise(compute, x)
 
 
 @intrinsic
@@ -372,4 +424,4 @@ def exponent_of(typing_context, x):
         bits = builder.lshr(builder.bitcast(value, WHOLE_NUMBERS), whole(52))
         return builder.sitofp(builder.sub(bits, whole(1023)), value.type)
 
-    return elementwise(x, compute, x)
+    return elementwise(compute, x)

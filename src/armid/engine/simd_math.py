@@ -18,7 +18,6 @@ from armid.engine.simd import (
     LANE_WIDTH,
     LINKED,
     RARE,
-    Lanes,
     any_above,
     exponent_of,
     fabs,
@@ -191,7 +190,7 @@ def define_unary(names: tuple[Any, ...], implementation: Callable[..., Any]) -> 
 
         @overload(name, jit_options=LINKED)
         def act(x):
-            return (lambda x: implementation(x)) if isinstance(x, Lanes) else None
+            return (lambda x: implementation(x)) if mixes_lanes(x) else None
 
 
 def define_binary(names: tuple[Any, ...], implementation: Callable[..., Any]) -> None:
