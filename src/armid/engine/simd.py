@@ -21,7 +21,7 @@ from numba.core.compiler import CompilerBase, DefaultPassBuilder, _LowerResult
 from numba.core.compiler_machinery import register_pass
 from numba.core.errors import TypingError
 from numba.core.registry import cpu_target
-from numba.core.typed_passes import NativeLowering
+from numba.core.typed_passes import NativeLowering, NopythonRewrites
 from numba.core.typing import signature
 from numba.core.typing.templates import AbstractTemplate, infer_global
 from numba.extending import intrinsic, lower_builtin, models, register_model
@@ -68,13 +68,14 @@ class LoweringApart(LinkedLowering):
 
 
 class Linked(CompilerBase):  # type: ignore[misc]
-    """Compile as numba does, but for machine code."""
+    """Compile as numba does, but for machine code, and for what numba rewrites of operations on arrays."""
 
     lowering = LinkedLowering
 
     def define_pipelines(self) -> list[Any]:
         passes = DefaultPassBuilder.define_nopython_pipeline(self.state)
-        passes.passes = [(self.lowering if p is NativeLowering else p, text) for p, text in passes.passes]
+        kept = [(p, text) for p, text in passes.passes if p is not NopythonRewrites]
+        passes.passes = [(self.lowering if p is NativeLowering else p, text) for p, text in kept]
         passes._finalized = False
         passes.finalize()
         return [passes]
