@@ -34,7 +34,7 @@ LONGEST_SPAN = 8
 FEWEST_IDLE = 8
 # What a node of an effect is where the effect is not used; a guard never crosses 0.
 IDLE = {"term": 0.0, "late": 0.0, "rate": 0.0, "guard": 1.0}
-# The time is the one argument of the equations that stands for itself.
+# The time is the one argument of the equations that holds one value.
 TIME = {"v_time": ["v_time"]}
 TEMPLATE = Path(__file__).parent / "templates" / "kernel.py.jinja"
 TEMPLATES = (TEMPLATE, TEMPLATE.with_name("history.py.jinja"))
@@ -289,7 +289,7 @@ class Emitter:
         return self.function(name, given, self.assignments(wanted, static), bundle_of([variable(k) for k in wanted]))
 
     def function(self, name: str, given: Mapping[str, list[str]], lines: list[str], result: str) -> str:
-        """Return the text of a function; given: argument -> names of what it holds, of which those in use are read."""
+        """Return the text of a function; given: argument -> names of what it holds; those in use are read."""
         body = [*lines, f"return {result}"]
         spoken = set(re.findall(r"\w+", "\n".join(body)))
         for argument, names in given.items():

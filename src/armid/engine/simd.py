@@ -1,8 +1,8 @@
 """Vector of doubles for numba: one value per candidate, side by side in the registers of the processor.
 
 Every operation acts lane by lane, so a candidate's result does not depend on its neighbours. A bundle holds the lanes
-of several quantities, as of all states of a machine; an operation acts on each of them, and what is no bundle serves
-all. It is one variable to numba, whose time to compile grows with their number, and registers to the processor.
+of several quantities, such as the states of a machine; an operation acts on each of them. To numba it is one variable,
+and numba's time to compile grows with their number; to the processor it is a number of registers.
 
 A function that compiled functions alone call is linked into them (`LINKED`), and never made executable by itself: numba
 makes machine code of each function with all that it calls, which is half of the time to compile a model with thirty
