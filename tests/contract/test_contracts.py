@@ -12,9 +12,10 @@ from armid.contract.check import check_identifier, check_thing
 from armid.contract.equations import check_effects
 from armid.contract.trials import simulate_plainly
 from armid.identifiers import IDENTIFIERS, identifier_of
-from armid.model import EFFECTS, PLANTS, Effect, Guard, Manoeuvre, Model, Parameter, State, applicable
+from armid.model import PLANTS, Effect, Guard, Manoeuvre, Model, Parameter, State
 from armid.problem.fitness import FITNESS
 from commands import python
+from smallest_plants import tried_on
 
 ARM = PLANTS["shell_transfer_arm"]
 AXIS = replace(PLANTS["driven_axis"].for_unit("m/s"), variants=())
@@ -47,16 +48,11 @@ def test_identifiers_of_other_libraries_keep_their_contract(name, monkeypatch):
     assert failures(check_identifier(IDENTIFIERS[name])) == []
 
 
-# The effects in one compiled model of a plant, all but one at their nulls. Each on the smallest plant that takes it:
-# the arm's equations are long to compile and to solve.
+# The effects in one compiled model of a plant, all but one at their nulls.
 @pytest.mark.slow
 @pytest.mark.parametrize("plant", [AXIS, ARM, PLANTS["flexible_link"]], ids=["axis", "arm", "link"])
 def test_every_effect_keeps_its_contract(plant):
-    smaller = {"shell_transfer_arm": [AXIS], "flexible_link": [AXIS, ARM]}.get(plant.name, [])
-    others = {name for one in smaller for name in applicable(EFFECTS, one)}
-    # the hard limit of the drive lies above what drives the axis in a trial
-    others ^= {"drive_saturation"} if plant in (ARM, AXIS) else set()
-    effects = [e for name, e in applicable(EFFECTS, plant).items() if name not in others]
+    effects = tried_on(plant)
     found = list(check_effects(effects, {plant.name: plant}))
     documented = {f.sentence for _, f in found if f.name.startswith("documented")}
     assert documented == {"every function has a docstring"}

@@ -246,16 +246,16 @@ COMMITTED = ("four_strokes", "one_stroke", "rocking_shell", "table1_stand/row_5"
 
 @pytest.mark.slow
 def test_right_campaigns_are_not_accused(root, stand, tmp_path):
-    options = [("--effect", *effects.split()) for effects in LACKING] + [text.split(" ") for text in SENSORS]
+    options = [("--effect", *effects.split()) for effects in LACKING[::2]] + [text.split(" ") for text in SENSORS]
     options += [("--holdout", "", "--seed", str(4100 + i), "--manoeuvres", PAIRS[i % len(PAIRS)],
-                 "--effect", *effects.split()) for i, effects in enumerate(LACKING[::3])]  # fmt: skip
+                 "--effect", *effects.split()) for i, effects in enumerate(LACKING[1::4])]  # fmt: skip
     folders = [stand("--repeats", "1", "--duration", "0.8", *words) for words in options]
     folders += [root / "studies" / "campaigns" / name for name in COMMITTED]
     folders += [pendulum(tmp_path / f"p{i}", i, friction) for i, friction in enumerate((0.0, 0.03, 0.1))]
     shutil.copytree(root / "studies" / "campaigns" / "paper_arm", tmp_path / "arm")
     folders += [halves(pendulum(tmp_path / "parts"), ("window_s = [0, 1.5]", "window_s = [1.6, 3]")),
                 halves(tmp_path / "arm", ("window_s = [0, 0.5]", "window_s = [0.6, 1]"))]  # fmt: skip
-    assert len(folders) >= 30
+    assert len(folders) >= 24
     accused = {str(f): said for f in folders if (said := accusations(said_of(f)))}
     assert not accused, accused
 
@@ -270,7 +270,7 @@ def halves(folder, windows):
 
 def test_a_long_record_is_simulated_whole_only_to_learn_how_few_samples_will_do(campaign, monkeypatch):
     """Most of its motion comes after the samples that the checks begin with, and it is seen all the same."""
-    folder, n, steps = campaign("one"), 200_000, []
+    folder, n, steps = campaign("one"), 100_000, []
     columns = dict(read_table(folder / "lower.csv", "lower.csv").columns)
     often = np.linspace(0.0, 0.7, n)
     measured = np.interp(often, columns["time_s"], columns[SPEED]) + np.random.default_rng(1).normal(0.0, 0.2, n)
@@ -290,7 +290,7 @@ def test_a_long_record_is_simulated_whole_only_to_learn_how_few_samples_will_do(
     model = read.model()
     whole = shortened(read.train[0], 1)
     thinned = DataTrial(model, space_of(model, read.parameters)).thinned(whole, 1)
-    assert (whole.n_samples, thinned.n_samples) == (n, 1 + n // 12)
+    assert (whole.n_samples, thinned.n_samples) == (n, 1 + n // 6)
     assert thinned.duration == pytest.approx(whole.duration, rel=1e-3)
     change(SPEED, np.negative, "lower.csv")(folder)
     assert any("sign looks inverted" in sentence for sentence in said_of(folder))

@@ -186,7 +186,7 @@ def dragged(folder, sensor, n_steps):
     """Close the loop on a disc with a drag that its model lacks; n_steps: of its simulation, for a sample."""
     rng, files = np.random.default_rng(31), []
     for _ in range(4):
-        voltage = np.repeat(rng.uniform(-9.0, 9.0, 15), 40)
+        voltage = np.repeat(rng.uniform(-9.0, 9.0, 11), 40)
         voltage[:60] = 0.0
         motion = moved(lambda x, fed: turning(x, fed) - [0.0, DRAG * x[1] * abs(x[1]) / INERTIA], voltage, 0.01,
                        (0.0, 0.0), "zero", n_steps)  # fmt: skip
@@ -266,7 +266,7 @@ damping = { low = 0.0, high = 10.0 }
 
 
 def test_sticks_of_a_coarse_encoder_tell_of_dry_friction(tmp_path):
-    rng, interval, n, step = np.random.default_rng(7), 0.01, 2000, 2.0 * np.pi / 4096
+    rng, interval, n, step = np.random.default_rng(7), 0.01, 1300, 2.0 * np.pi / 4096
     tables = {}
     for file in ("a.csv", "b.csv"):
         phases = rng.uniform(0.0, 2.0 * np.pi, 3)

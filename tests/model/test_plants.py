@@ -10,9 +10,10 @@ from armid.contract.trials import away, middle, simulate_plainly
 from armid.engine import Schedule, simulate
 from armid.errors import ArmidError
 from armid.inference.candidates import EffectKey, constant_effects
-from armid.model import EFFECTS, PLANTS, Manoeuvre, Model, Scales, applicable
+from armid.model import PLANTS, Manoeuvre, Model, Scales
 from armid.model.parameter import warn_if_far
 from armid.model.plants.driven_axis import driven_axis
+from smallest_plants import tried_on
 
 PLANT = PLANTS["shell_transfer_arm"]
 
@@ -98,7 +99,7 @@ MOTIONS = {
 def test_all_at_once_move_as_their_plain_functions(where):
     """In steps so fine that the engine is within 1e-7 rad/s of the truth, but for the brushes' width."""
     plant, manoeuvre, own = MOTIONS[where]
-    model = Model(plant, tuple(applicable(EFFECTS, plant).values()))
+    model = Model(plant, tuple(tried_on(plant)))
     values = {n: middle(p) if p.null is None else p.null for n, p in model.parameters.items()} | own
     still = np.array(list(values.values()))
     for effect in model.effects:

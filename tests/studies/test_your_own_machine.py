@@ -60,7 +60,7 @@ def test_a_late_voltage_is_no_late_torque(folder, plugin):
         signal = signal + replay.record.noise.rms * rng.standard_normal(signal.shape)
         records.append(replay.measuring(signal).record)
     campaign = replace(read_campaign(folder / "campaign", {"boom": torque_alone}), records=tuple(records))
-    campaign = campaign.with_window(0.0, 3.0)
+    campaign = campaign.with_window(0.0, 1.8)
     found = close_loop(Model(torque_alone), campaign, {n: EFFECTS[n] for n in ("controller_delay", "output_lag")})
     assert [s.effect for s in found.steps] == ["controller_delay"]
     inertia = found.after.estimates[0]

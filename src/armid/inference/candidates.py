@@ -88,7 +88,7 @@ def bundled(declared: Model, effects: Mapping[EffectKey, Effect]) -> tuple[Activ
     """Return keys of candidates in bundles that compose without a circle.
 
     First those without states and late signals of their own, whose model takes half of the time; then these and all
-    others, whose model holds test signals too.
+    others, whose model holds test signals too. Few are one bundle.
     """
     pairs = sorted(((key, compiled(key, effect)) for key, effect in effects.items()), key=lambda pair: pair[1].name)
     plain = [pair for pair in pairs if not (pair[1].states or pair[1].delays)]

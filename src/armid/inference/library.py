@@ -214,11 +214,8 @@ class Library:
 
     @property
     def tested(self) -> tuple[Active, ...]:
-        """The bundle whose model holds the test signals too, which would be one more to compile; of several the last.
-
-        The model of an only bundle is that of all fits, and is faster without them.
-        """
-        return self.bundles[1:][-1:]
+        """The bundle whose model holds the test signals too, which would be one more to compile; of several the last."""
+        return self.bundles[-1:]
 
     def with_test_signals(self, model: Model) -> Model:
         """Return a model that holds all of another, and a test signal at each port."""
