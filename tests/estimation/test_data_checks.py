@@ -270,7 +270,7 @@ def halves(folder, windows):
 
 def test_a_long_record_is_simulated_whole_only_to_learn_how_few_samples_will_do(campaign, monkeypatch):
     """Most of its motion comes after the samples that the checks begin with, and it is seen all the same."""
-    folder, n, steps = campaign("one"), 100_000, []
+    folder, n, steps = campaign("one"), 200_000, []
     columns = dict(read_table(folder / "lower.csv", "lower.csv").columns)
     often = np.linspace(0.0, 0.7, n)
     measured = np.interp(often, columns["time_s"], columns[SPEED]) + np.random.default_rng(1).normal(0.0, 0.2, n)
@@ -290,7 +290,7 @@ def test_a_long_record_is_simulated_whole_only_to_learn_how_few_samples_will_do(
     model = read.model()
     whole = shortened(read.train[0], 1)
     thinned = DataTrial(model, space_of(model, read.parameters)).thinned(whole, 1)
-    assert (whole.n_samples, thinned.n_samples) == (n, 1 + n // 6)
+    assert (whole.n_samples, thinned.n_samples) == (n, 1 + n // 12)
     assert thinned.duration == pytest.approx(whole.duration, rel=1e-3)
     change(SPEED, np.negative, "lower.csv")(folder)
     assert any("sign looks inverted" in sentence for sentence in said_of(folder))

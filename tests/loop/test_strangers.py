@@ -186,7 +186,7 @@ def dragged(folder, sensor, n_steps):
     """Close the loop on a disc with a drag that its model lacks; n_steps: of its simulation, for a sample."""
     rng, files = np.random.default_rng(31), []
     for _ in range(4):
-        voltage = np.repeat(rng.uniform(-9.0, 9.0, 11), 40)
+        voltage = np.repeat(rng.uniform(-9.0, 9.0, 15), 40)
         voltage[:60] = 0.0
         motion = moved(lambda x, fed: turning(x, fed) - [0.0, DRAG * x[1] * abs(x[1]) / INERTIA], voltage, 0.01,
                        (0.0, 0.0), "zero", n_steps)  # fmt: skip

@@ -214,7 +214,7 @@ class Library:
 
     @property
     def tested(self) -> tuple[Active, ...]:
-        """The bundle whose model holds the test signals too, which would be one more to compile; of several the last."""
+        """The bundle whose model holds the test signals too, which would be one more to compile: the last."""
         return self.bundles[-1:]
 
     def with_test_signals(self, model: Model) -> Model:
