@@ -390,18 +390,19 @@ def taken(path: Descent, tried: Sequence[Array], residuals: Array, dampings: Seq
 
 
 def promised_fall(square: Array, slope: Array, z: Array, walls: tuple[Array, Array]) -> float:
-    """Return by how much a step without damping would lower chi2, to first order.
+    """Return by how much a step without damping would lower chi2, to second order.
 
     square: J^T J, slope: J^T residual.
     """
-    return float(slope @ (step_in_box(square, slope, z, LEAST_DAMPING, walls) - z))
+    step = step_in_box(square, slope, z, LEAST_DAMPING, walls) - z
+    return float(2.0 * slope @ step - step @ square @ step)
 
 
 def step_in_box(square: Array, slope: Array, z: Array, damping: float, walls: tuple[Array, Array]) -> Array:
     """Return the candidate to which a damped step leads.
 
-    A parameter that would leave the box stops on it, and the others make up for that. walls: the ends of the box, see
-    `LeastSquaresProblem.walls`; unknowns behind the parameters have none.
+    The step goes on until a parameter meets an end of the box, and from there with the others, so that each part of it
+    leads down. walls: the ends of the box, see `LeastSquaresProblem.walls`; unknowns behind the parameters have none.
     """
     scale = np.diag(square)
     damped = square + np.diag(damping * scale + 1e-12 * max(float(scale.max(initial=0.0)), 1e-300))
@@ -411,12 +412,17 @@ def step_in_box(square: Array, slope: Array, z: Array, damping: float, walls: tu
     free = ~((z <= low) & (slope < 0.0) | (z >= high) & (slope > 0.0))
     while free.any():
         known = slope[free] - damped[np.ix_(free, ~free)] @ step[~free]
-        step[free] = np.linalg.solve(damped[np.ix_(free, free)], known)
-        outside = free & ((z + step < low) | (z + step > high))
-        if not outside.any():
+        more = np.zeros(len(z))
+        more[free] = np.linalg.solve(damped[np.ix_(free, free)], known) - step[free]
+        end = np.where(more < 0.0, low, high) - z
+        shares = np.divide(end - step, more, out=np.full(len(z), np.inf), where=more != 0.0)
+        share = max(float(shares.min()), 0.0)
+        if not share < 1.0:
+            step += more
             break
-        step[outside] = np.clip(z + step, low, high)[outside] - z[outside]
-        free &= ~outside
+        met = shares <= share
+        step = np.where(met, end, step + share * more)
+        free &= ~met
     return np.clip(z + step, low, high)
 
 
