@@ -9,7 +9,17 @@ from linear_records import linear_records
 from scipy.optimize import lsq_linear
 
 from armid.errors import ArmidError
-from armid.estimation.least_squares import LeastSquaresProblem, descend, estimate, fit, refine, side_by_side
+from armid.estimation.least_squares import (
+    LEAST_DAMPING,
+    LeastSquaresProblem,
+    descend,
+    estimate,
+    fit,
+    promised_fall,
+    refine,
+    side_by_side,
+    step_in_box,
+)  # fmt: skip
 from armid.problem.space import Space
 from changed_records import noisy
 
@@ -115,3 +125,21 @@ def test_work_is_shared_among_threads_and_comes_in_order():
     assert side_by_side(lambda _: both.wait() >= 0, range(2), 2) == [True, True]
     with pytest.raises(ZeroDivisionError):
         side_by_side(lambda x: 1 / x, [1, 0], 2)
+
+
+def test_a_step_in_the_box_leads_down_however_much_of_it_lies_outside():
+    """Where the unknowns nearly make up for each other, the whole step leads far out of the box."""
+    rng, box, reached = np.random.default_rng(5), (np.zeros(5), np.ones(5)), []
+    for _ in range(200):
+        slopes = rng.normal(size=(30, 5)) @ np.diag(10.0 ** rng.uniform(-6.0, 0.0, 5)) @ rng.normal(size=(5, 5))
+        residual, z = rng.normal(size=30), rng.uniform(size=5) * (rng.uniform(size=5) > 0.3)
+        square, slope = slopes.T @ slopes, slopes.T @ residual
+        step = step_in_box(square, slope, z, LEAST_DAMPING, box) - z
+        assert np.all((z + step >= 0.0) & (z + step <= 1.0))
+        best = lsq_linear(slopes, residual, (-z, 1.0 - z + 1e-12)).x
+        most = residual @ residual - np.sum((residual - slopes @ best) ** 2)
+        falls = promised_fall(square, slope, z, box)
+        assert falls >= -1e-9
+        reached.append(falls / max(most, 1e-12))
+    assert np.median(reached) > 0.99
+    assert np.min(reached) > 0.9

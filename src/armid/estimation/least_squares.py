@@ -301,6 +301,8 @@ MOST_ITERATIONS = 50
 # Dampings that are tried, as factors of the last best one; where no step helps, all are raised so much.
 LADDER, RAISED = (1e-3, 0.1, 1.0, 10.0), 1e3
 FIRST_DAMPING, LEAST_DAMPING, LARGEST_DAMPING = 1e-3, 1e-9, 1e6
+# A push from an end of the box back inside counts from this share of all slopes on.
+LEAST_PUSH = 1e-9
 # Two starts that have come this close to each other, in shares of the range, are one.
 SAME_POINT = 1e-3
 # A path is given up that would not come to a limit with so many times the fall that its slopes promise.
@@ -401,28 +403,34 @@ def promised_fall(square: Array, slope: Array, z: Array, walls: tuple[Array, Arr
 def step_in_box(square: Array, slope: Array, z: Array, damping: float, walls: tuple[Array, Array]) -> Array:
     """Return the candidate to which a damped step leads.
 
-    The step goes on until a parameter meets an end of the box, and from there with the others, so that each part of it
-    leads down. walls: the ends of the box, see `LeastSquaresProblem.walls`; unknowns behind the parameters have none.
+    The step goes on until a parameter meets an end of the box, and from there with the others; one that is pushed back
+    inside goes along again. So each part of it leads down. walls: the ends of the box, see
+    `LeastSquaresProblem.walls`; unknowns behind the parameters have none.
     """
     scale = np.diag(square)
     damped = square + np.diag(damping * scale + 1e-12 * max(float(scale.max(initial=0.0)), 1e-300))
     n_others = len(z) - len(walls[0])
     low, high = (np.append(wall, np.full(n_others, end)) for wall, end in zip(walls, (-np.inf, np.inf), strict=True))
-    step = np.zeros(len(z))
+    step, sizes = np.zeros(len(z)), np.sqrt(np.diag(damped))
     free = ~((z <= low) & (slope < 0.0) | (z >= high) & (slope > 0.0))
-    while free.any():
+    for _ in range(3 * len(z)):
         known = slope[free] - damped[np.ix_(free, ~free)] @ step[~free]
         more = np.zeros(len(z))
         more[free] = np.linalg.solve(damped[np.ix_(free, free)], known) - step[free]
         end = np.where(more < 0.0, low, high) - z
         shares = np.divide(end - step, more, out=np.full(len(z), np.inf), where=more != 0.0)
-        share = max(float(shares.min()), 0.0)
-        if not share < 1.0:
-            step += more
+        share = max(float(shares.min(initial=np.inf)), 0.0)
+        if share < 1.0:
+            met = shares <= share
+            step = np.where(met, end, step + share * more)
+            free &= ~met
+            continue
+        step += more
+        push = np.where(free, 0.0, slope - damped @ step)
+        inwards = np.where(z + step <= low, push, -push) / sizes
+        if not inwards.max(initial=0.0) > LEAST_PUSH * np.linalg.norm(slope / sizes):
             break
-        met = shares <= share
-        step = np.where(met, end, step + share * more)
-        free &= ~met
+        free[int(np.argmax(inwards))] = True
     return np.clip(z + step, low, high)
 
 

@@ -448,24 +448,37 @@ def with_noise_in_motion(library: Library, inference: Inference) -> Library:
     """Return the library with the noise in motion that the model in force shows, else the library as it is.
 
     If an unknown signal is probable, noise in motion takes its place if the records are more probable with it and no
-    test finds more. If a model may be right and records have no rest, alternating noise is looked for too: its
-    differences make it look larger than it is, which hides effects.
+    test finds more. A fault or an effect of the model in force may only stand in for that noise. If a model may be
+    right and records have no rest, alternating noise is looked for too: its differences make it look larger than it is,
+    which hides effects.
     """
-    fit = inference.exploration.fits[inference.in_force]
     is_unknown, read = inference.posterior.unknown_is_likely, library.as_read or library.data
     if not is_unknown and read.known:
         return library
-    seen = train_residuals(fit)
+    less = simpler(inference.exploration, inference.in_force, of_any_kind=True) if is_unknown else []
+    for model in (inference.in_force, *less):
+        noisy = with_noise_left(library, inference.exploration.fits[model], inference, is_unknown)
+        if noisy is not None:
+            library.say("the noise in motion is another than at rest: the records are more probable so")
+            return noisy
+    return library
+
+
+def with_noise_left(library: Library, fit: Fit, inference: Inference, all_is_noise: bool) -> Library | None:
+    """Return the library with the noise in motion that a fit shows, None where the records are less probable with it.
+
+    all_is_noise: whether no test may find more in what the fit leaves.
+    """
+    read, seen = library.as_read or library.data, train_residuals(fit)
     levels = levels_in_motion(read.levels, seen.replays, seen.raw)
     if not any(level.in_motion for level in levels):
-        return library
+        return None
     noisy = library.with_data(read.with_levels(levels))
     noisy = with_measured_inputs(noisy, fit) if library.as_read else noisy
     problem = replace(fit.records, data=noisy.data)
     shown = Fit(fit.active, problem, fit.z, problem.plain.residuals(fit.z)[0])
-    if (is_unknown and is_significant(shown)) or not is_likelier(shown, inference):
-        return library
-    library.say("the noise in motion is another than at rest: the records are more probable so")
+    if (all_is_noise and is_significant(shown)) or not is_likelier(shown, inference):
+        return None
     return noisy
 
 

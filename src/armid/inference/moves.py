@@ -357,9 +357,10 @@ def pairs(
         yield key, near(about.fit, active, [values_of], library, about.scale.weight)
 
 
-def simpler(exploration: Exploration, model: Hypotheses) -> list[Hypotheses]:
-    """Return the known models that lack one effect of a model, the most probable first."""
-    less = [model - {h} for h in sorted(model) if h.kind == "effect" and model - {h} in exploration.fits]
+def simpler(exploration: Exploration, model: Hypotheses, of_any_kind: bool = False) -> list[Hypotheses]:
+    """Return the known models that lack one effect of a model, or one hypothesis, the most probable first."""
+    lacking = [model - {h} for h in sorted(model) if of_any_kind or h.kind == "effect"]
+    less = [m for m in lacking if m in exploration.fits]
     return sorted(less, key=lambda m: -exploration.log_posterior(m))
 
 
