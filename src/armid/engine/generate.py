@@ -31,7 +31,7 @@ BLOCK = 256
 MAX_CUTS = 8
 LONGEST_SPAN = 8
 # Below so many effects a model is what a user asked for, every effect in use; the choice would only cost.
-FEWEST_IDLE = 5
+FEWEST_IDLE = 8
 # What a node of an effect is where the effect is not used; a guard never crosses 0.
 IDLE = {"term": 0.0, "late": 0.0, "rate": 0.0, "guard": 1.0}
 # The time is the one argument of the equations that holds one value.

@@ -222,7 +222,9 @@ class Library:
         for whole in map(self.compiled_model, self.tested):
             if model.parameters.keys() <= whole.parameters.keys():
                 return whole
-        return Model(model.plant, (*model.effects, *map(bump_at, model.plant.ports)))
+        held = {effect.name for effect in model.effects}
+        tests = [test for test in map(bump_at, model.plant.ports) if test.name not in held]
+        return replace(model, effects=(*model.effects, *tests)) if tests else model
 
     def space(self, model: Model, active: Active) -> Space:
         """Return the space of a compiled model in which the candidates that are not active rest at their null."""
