@@ -99,13 +99,12 @@ def kernel_text(parts: KernelParts) -> str:
     environment.filters |= {"listed": listed, "nested": nested}
     late_of = parts.late_states
     remembered = {one.place: one.of for one in late_of}
-    moving = {j for j in range(len(parts.delays)) if j < parts.n_moving}
     count_of = Counter(one.delay for one in late_of)
     return environment.get_template(TEMPLATE.name).render(
         vars(parts), block=BLOCK, max_cuts=MAX_CUTS, longest=LONGEST_SPAN, wide=bool(parts.used),
         guards=[*parts.latches, *parts.kinks], driven=[*parts.inputs, *(one.name for one in parts.late_inputs)],
         remembered=[remembered[i] for i in sorted(remembered)], numbers_of_delays=range(len(parts.delays)),
-        count_of=count_of, delays_of_states=sorted(count_of), felt=sorted(moving & set(count_of)),
+        count_of=count_of, delays_of_states=sorted(count_of), felt=sorted(j for j in count_of if j < parts.n_moving),
         n_cutting=parts.n_moving if parts.inputs else 0,
     )  # fmt: skip
 
@@ -172,13 +171,10 @@ class Emitter:
         named = {kind: [variable(k) for k in keys] for kind, keys in names.items()}
         moving = {
             "latches": named["latches"], "x": named["states"],
-            "u": [*named["inputs"], *(one.name for one in late_inputs)], "l": [one.name for one in late_states],
-            "fixed": [*map(variable, fixed), *using], "used": used,
+            "u": [*named["inputs"], *(one.name for one in late_inputs)],
+            **({"l": [one.name for one in late_states]} if late_states else {}),
+            "fixed": [*map(variable, fixed), *using], **({"used": used} if used else {}),
         }  # fmt: skip
-        if not late_states:
-            del moving["l"]
-        if not used:
-            del moving["used"]
         switches = [line for effect, nulls in self.strengths.items() for line in use_lines(effect, nulls)]
         constant = bundle_of([variable(k) for k in fixed] + using)
         texts = [

@@ -140,18 +140,21 @@ def is_number(numba_type: Any) -> bool:
     return isinstance(numba_type, NUMBER_TYPES)
 
 
-def mixes_lanes(*given: Any) -> bool:
-    """Tell whether numba types are numbers, lanes and bundles of one size, with more than numbers among them."""
-    sizes = {t.count for t in given if isinstance(t, Bundle)}
-    several = [t for t in given if isinstance(t, (Lanes, Bundle))]
-    return len(sizes) < 2 and bool(several) and all(is_number(t) or t in several for t in given)
-
-
 def joint_type(*given: Any) -> Any:
-    """Return the type of what an operation makes of numbers, lanes and bundles, None where they do not fit."""
-    if not mixes_lanes(*given):
-        return LANES_TYPE if all(map(is_number, given)) else None
-    return next((t for t in given if isinstance(t, Bundle)), LANES_TYPE)
+    """Return the numba type of what an operation makes of numbers, lanes and bundles of one size.
+
+    None where there are other types among them, bundles of several sizes, or numbers alone.
+    """
+    several = [t for t in given if not is_number(t)]
+    bundles = {t for t in several if isinstance(t, Bundle)}
+    if not several or len(bundles) > 1 or not all(isinstance(t, (Lanes, Bundle)) for t in several):
+        return None
+    return bundles.pop() if bundles else LANES_TYPE
+
+
+def mixes_lanes(*given: Any) -> bool:
+    """Tell whether an operation on numba types is one on lanes."""
+    return joint_type(*given) is not None
 
 
 def broadcast(builder: Any, value: Any) -> Any:
@@ -205,7 +208,7 @@ def bundled(builder: Any, vectors: Sequence[Any]) -> Any:
 
 def elementwise(compute: Callable[..., Any], *given: Any) -> tuple[Any, Callable[..., Any]]:
     """Return signature and code of an intrinsic on lanes or bundles; given: numba types of what it takes."""
-    result = joint_type(*given)
+    result = LANES_TYPE if all(map(is_number, given)) else joint_type(*given)
     if result is None:
         raise TypingError(f"numbers, lanes or bundles of one size are expected, not {', '.join(map(str, given))}")
     return result(*given), on_lanes(compute)
@@ -286,7 +289,8 @@ class LanesOperator(AbstractTemplate):  # type: ignore[misc]
     """Type an operator for lanes with lanes and lanes with numbers."""
 
     def generic(self, given: Any, named: Any) -> Any:
-        return signature(joint_type(*given), *given) if mixes_lanes(*given) else None
+        result = joint_type(*given)
+        return None if result is None else signature(result, *given)
 
 
 def define_operator(python_operator: Any, compute: Callable[..., Any]) -> None:
