@@ -213,3 +213,10 @@ def test_what_cannot_be_written_down(function, sentence):
 def test_what_numba_cannot_compile(function, sentence):
     error = refused(function, sentence)
     assert error.__cause__ is not None, "the cause must not be lost"
+
+
+def test_a_rate_that_is_several_numbers_is_told_in_the_same_words():
+    lag = State("lag", "rad/s", lambda lag, omega: (omega, lag), lambda: 0.0)
+    bad = Effect("bad", (Parameter("c", "effort/speed", 0, 1, null=0.0),), {"torque": lambda lag, c: -c * lag}, (lag,))
+    with pytest.raises(ArmidError, match=r"\(it returns several numbers\): one number is expected"):
+        simulate(Model(PLANTS["driven_axis"]) + bad, MANOEUVRE, [[1.0, 0.1]])

@@ -275,6 +275,8 @@ def load_module(parts: KernelParts) -> ModuleType:
     return module
 
 
+# What takes the result of an equation, in numba's words: a lane, or a tuple of several results.
+TAKES_RESULTS = r"(with_lane\(|bundle\(\w*Tuple\()"
 NO_NUMBER_IN_A_BRANCH = "it does not return a number in every case"
 SEVERAL_NUMBERS = "it returns several numbers"
 # What is expected in place of that.
@@ -294,9 +296,9 @@ def compile_error(error: Exception) -> ArmidError:
 def cause(text: str) -> str:
     """Return the one line of numba's message that says most."""
     call = re.search(r"^ *>>> (.+)$", text, re.MULTILINE)
-    if call and re.search(r"with_lane\(.*(Optional|none)", call[1]):
+    if call and re.search(rf"{TAKES_RESULTS}.*(Optional|none)", call[1]):
         return NO_NUMBER_IN_A_BRANCH
-    if call and re.search(r"with_lane\(.*(array|Tuple|list)\(", call[1]):
+    if call and re.search(rf"{TAKES_RESULTS}.*(array|Tuple|list)\(", call[1]):
         return SEVERAL_NUMBERS
     if call:
         return f"numba has no {re.sub(r'lanes[0-9]+', 'float64', call[1])}"
