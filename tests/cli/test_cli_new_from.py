@@ -77,6 +77,17 @@ def test_a_unit_that_nothing_tells_is_a_guess_and_an_encoder_that_is_not_used_no
     assert [s.header for s in read_campaign(tmp_path / "mine").train[0].signals] == ["angular_velocity_rad_s"]
 
 
+def test_a_column_that_is_not_used_is_not_read_as_another_input_or_output(run, tmp_path):
+    times, drive, speed, angle = wheel(4)
+    write(tmp_path / "motor.csv", "time_s,drive_V,current_A,angle_deg,angle_rad", times, drive, 0.2 * drive,
+          np.rad2deg(angle), angle)  # fmt: skip
+    assert run("new", "campaign", "motor", "--from", "motor.csv").code == 0
+    table = read_table(tmp_path / "motor" / "motor.csv", "motor.csv").columns
+    assert list(table) == ["time_s", "drive_V", "angle_deg", "unused_current_A", "unused_angle_rad"]
+    np.testing.assert_allclose(table["drive_V"], drive, rtol=1e-8)
+    assert run("check", "motor").code == 0
+
+
 def test_one_file_of_steps_tells_that_the_drive_is_held(run, tmp_path):
     times, drive, speed, _ = wheel(4)
     for name, driven in (("chirp.csv", np.sin(times**2)), ("steps.csv", drive)):

@@ -293,10 +293,11 @@ def guessed_campaign(
         named = [f'{i} = "{headers[i]}"' for i in inputs]
     guess = "" if is_given else "  # GUESS: it has outputs of these names"
     model = GUESSED_MODELS[linear] if plant is None else (f'plant = "{plant.name}"{guess}',)
+    read = headers_of(plant or PLANTS["linear_axis" if linear else "rotary_arm"])
     renamed = {roles[quantity].header: header for quantity, header in headers.items()}
     drives = {headers[i]: roles[i].factor for i in inputs}
     second = seconds_of(roles["time"], tables[0], notes)
-    written = {table.file: rewritten(table, renamed, roles["time"].header, second, drives) for table in tables}
+    written = {table.file: rewritten(table, renamed, roles["time"].header, second, drives, read) for table in tables}
     unused = [header for header in tables[0].columns if header not in (roles["time"].header, *renamed)]
     notes += [f"not used: {', '.join(map(quoted, unused))}"] if unused else []
     if any(column_of(h).end in COUNT_ENDS for h in unused):
@@ -329,6 +330,12 @@ def plant_of(table: CsvTable) -> Plant | None:
     n_guessed = len({quantity_of(c) for c in columns} & {"speed", "position"})
     likely = [plant for plant in PLANTS.values() if is_driven(plant) and n_read(plant) > n_guessed]
     return max(likely, key=n_read, default=None)
+
+
+def headers_of(plant: Plant) -> frozenset[str]:
+    """Return every header of a record that a plant reads, its inputs' own names too."""
+    inputs = [header for i in plant.inputs for header in (*i.columns, i.name)]
+    return frozenset([*inputs, *(header for o in plant.outputs for header in o.factors)])
 
 
 def moves_straight(roles: Mapping[str, FileColumn], table: CsvTable) -> bool:
@@ -451,11 +458,12 @@ def seconds_of(column: FileColumn, table: CsvTable, notes: list[str]) -> float:
 
 
 def rewritten(
-    table: CsvTable, renamed: Mapping[str, str], time: str, second: float, drives: Mapping[str, float]
-) -> dict[str, Array]:
+    table: CsvTable, renamed: Mapping[str, str], time: str, second: float, drives: Mapping[str, float],
+    read: frozenset[str],
+) -> dict[str, Array]:  # fmt: skip
     """Return the columns of a file under the headers of a record; numbers are kept where the unit is.
 
-    drives: header of an input -> what its numbers are multiplied by.
+    drives: header of an input -> what its numbers are multiplied by. read: headers that the plant reads.
     """
     for header in (time, *renamed):
         if header not in table.headers:
@@ -464,8 +472,8 @@ def rewritten(
         table.numbers(header, gaps=header != time and renamed.get(header) not in drives)
     times = table.columns[time] if second == 1.0 else np.round(table.columns[time] * second, 12)
     taken = {"time_s", *renamed.values()}
-    # an encoder that is not used must not be taken for an output, which wants the counts of a turn
-    kept = {h: f"unused_{h}" if column_of(h).end in COUNT_ENDS else h for h in table.columns
+    # what is not used must not be taken for another input or output, as the counts of an encoder, which want its turn
+    kept = {h: f"unused_{h}" if h in read or column_of(h).end in COUNT_ENDS else h for h in table.columns
             if h not in (time, *renamed) and h not in taken and "," not in h}  # fmt: skip
     own = {new: table.columns[h] * drives.get(new, 1.0) for h, new in renamed.items()}
     return {"time_s": times} | own | {new: table.columns[h] for h, new in kept.items()}

@@ -200,7 +200,8 @@ def entries_of(examination: Examination) -> dict[str, dict[str, Any]]:
                   examination.at_bound, strict=True)  # fmt: skip
     return {p.name: {
         "value": value, "unit": p.unit, "deviation": deviation, "deviation_with_tolerances": wider,
-        "low": value - half, "high": value + half, "bound_low": p.box[0], "bound_high": p.box[1],
+        **dict(zip(("low", "high"), examination.space.of_one_sign(p.name, value - half, value + half), strict=True)),
+        "bound_low": p.box[0], "bound_high": p.box[1],
         "bound_active": held,
         "profile": {
             "minimum": p.estimate, "low": p.low, "high": p.high, "bounded_low": p.bounded[0],

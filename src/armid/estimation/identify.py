@@ -170,8 +170,9 @@ class Identification(Result):
         half = self.uncertainty.half_width[k]
         low, high = (value - half, value + half) if scatter is None else (scatter.low[k], scatter.high[k])
         known = bool(np.isfinite([low, high]).all())
+        low, high = space.of_one_sign(name, float(low), float(high))
         return ParameterEstimate(
-            value, space.units[i], float(low) if known else None, float(high) if known else None, float(space.low[i]),
+            value, space.units[i], low if known else None, high if known else None, float(space.low[i]),
             float(space.high[i]), bool(self.at_bound[i]), not doubt, doubt,
             "sensitivities" if scatter is None else "bootstrap", None if scatter is None else float(scatter.bias[k]),
         )  # fmt: skip

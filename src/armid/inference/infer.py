@@ -200,7 +200,8 @@ class Inference:
         narrow, wide = fit.noise_half_width, NORMAL_95 * fit.records.span * np.sqrt(np.diag(spread(expansion))[:n])
         wide = np.maximum(wide, np.where(np.isfinite(narrow), narrow, 0.0))
         triples = zip(fit.values.items(), wide.tolist(), narrow.tolist(), strict=True)
-        return {name: Interval(*in_box(fit.records.space, name, v - w, v + w), v - a, v + a)
+        space = fit.records.space
+        return {name: Interval(*in_box(space, name, v - w, v + w), *space.of_one_sign(name, v - a, v + a))
                 for (name, v), w, a in triples}  # fmt: skip
 
     @property

@@ -68,6 +68,16 @@ class Space:
             space = space.with_bounds(name, low * WIDER ** -np.sign(low), high * WIDER ** np.sign(high))
         return space
 
+    def of_one_sign(self, name: str, low: float, high: float) -> tuple[float, float]:
+        """Return the part of an interval that has the sign of the range, where the range has one.
+
+        >>> mass = Space(("mass",), ("kg",), np.array([1.0]), np.array([9.0]), np.array([np.nan]))
+        >>> mass.of_one_sign("mass", -4.0, 30.0)
+        (0.0, 30.0)
+        """
+        i = self.index(name)
+        return (max(low, 0.0) if self.low[i] >= 0.0 else low), (min(high, 0.0) if self.high[i] <= 0.0 else high)
+
     def with_fixed(self, name: str, value: float) -> "Space":
         """Return the space with a parameter fixed.
 
