@@ -2,6 +2,7 @@
 
 import tempfile
 import warnings
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from reading_whatever import many
 
 from armid.errors import ArmidError
 from armid.record import RecordWarning
-from armid.record.table import read_table
+from armid.record.table import read_table, time_column
 
 NAMES = ("time_s", "angular_velocity_rad_s", "drive_V")
 # What spreadsheets, loggers and languages print.
@@ -130,3 +131,33 @@ def test_what_may_be_read_in_two_ways_is_refused(text, words):
     assert table is None
     for word in words:
         assert word in said
+
+
+CLOCKS = {"{:%H:%M:%S.%f}", "{:%Y-%m-%d %H:%M:%S.%f}", "{:%Y-%m-%dT%H:%M:%S.%fZ}", "{:%Y-%m-%d %H:%M:%S.%f+02:00}"}
+
+
+@many(50)
+@given(st.datetimes(datetime(1999, 1, 1), datetime(2040, 1, 1)), st.sampled_from(sorted(CLOCKS)), st.booleans(),
+       st.lists(st.integers(1, 40_000_000_000), min_size=1, max_size=8))  # fmt: skip
+@example(datetime(2024, 2, 28, 23, 59, 59, 999_999), "{:%H:%M:%S.%f}", True, [1, 1])
+def test_times_of_day_are_seconds_after_the_first_row(begin, form, comma, steps):
+    """Steps of up to eleven hours in microseconds, so that midnight passes within a day's half."""
+    after = np.append(0, np.cumsum(steps))
+    cells = [form.format(begin + timedelta(microseconds=int(n))) for n in after]
+    cells = [cell.replace(".", ",") if comma else cell for cell in cells]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "a.csv"
+        path.write_text("time_s;w\n" + "".join(f"{cell};1\n" for cell in cells))
+        with pytest.warns(RecordWarning):
+            table = read_table(path, "a.csv")
+    with pytest.warns(RecordWarning, match="times of day, which are read as seconds after the first row"):
+        np.testing.assert_allclose(time_column(table), 1e-6 * after, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("cells", [["12:00:01", "12:00:62 s"], ["12:00", "12:01"], ["2024-13-01 10:00:00"] * 2,
+                                   ["2024-05-01 10:00:00Z", "2024-05-01 10:00:01+02:00"]])  # fmt: skip
+def test_other_times_are_refused(tmp_path, cells):
+    path = tmp_path / "a.csv"
+    path.write_text("time_s,w\n" + "".join(f"{cell},1\n" for cell in cells))
+    with pytest.raises(ArmidError, match=r"time_s is '.*', a finite number is expected"):
+        time_column(read_table(path, "a.csv"))

@@ -78,7 +78,7 @@ def test_a_unit_that_nothing_tells_is_a_guess_and_an_encoder_that_is_not_used_no
 
 
 def test_a_column_that_is_not_used_is_not_read_as_another_input_or_output(run, tmp_path):
-    times, drive, speed, angle = wheel(4)
+    times, drive, _, angle = wheel(4)
     write(tmp_path / "motor.csv", "time_s,drive_V,current_A,angle_deg,angle_rad", times, drive, 0.2 * drive,
           np.rad2deg(angle), angle)  # fmt: skip
     assert run("new", "campaign", "motor", "--from", "motor.csv").code == 0

@@ -125,6 +125,7 @@ TOML = {
     "file of a drive": (GOOD.replace("lower.csv", "C:\\\\lower.csv"), ["lower.csv'"]),
     "zero in the name": (GOOD.replace("lower.csv", "lower\\u0000.csv"), ["CSV file"]),
     "broken TOML": (GOOD.replace("shell = true", "shell = = true"), ["campaign.toml", "not valid TOML", "line 9"]),
+    "text without quotes": ('name = a\nplant = "driven_axis"', ["line 1", "text stands in quotes, name = 'a'"]),
     "binary TOML": (b"\xff\xfe\x00\x01", ["campaign.toml, line 1", "UTF-8"]),
     "deep TOML": ("a = " + "[" * 5000, ["campaign.toml", "TOML"]),
     "deep tables": (GOOD + "[records.constants." + ".".join("a" * 3000) + "]", ["'constants.a'", "finite number"]),

@@ -190,7 +190,7 @@ def record(size: float, frequency: float, seed: int) -> dict[str, Array]:
 
 # Words of a header, without its unit, that tell what a column is; the first that fits.
 WORDS_OF_HEADERS = {
-    "time": ("time", "t", "timestamp", "clock", "tempo", "zeit", "temps"),
+    "time": ("time", "t", "timestamp", "date", "datetime", "clock", "tempo", "zeit", "temps"),
     "speed": ("angular_velocity", "velocity", "speed", "omega", "vel", "w", "rate", "gyro", "tacho", "tachometer"),
     "position": ("angle", "position", "pos", "theta", "phi", "q"),
     "drive": ("drive", "u", "voltage", "torque", "force", "command", "current", "duty", "pwm", "input", "motor"),
@@ -326,7 +326,7 @@ def plant_of(table: CsvTable) -> Plant | None:
     def is_driven(plant: Plant) -> bool:
         return all(any(h in table.headers for h in i.columns) for i in plant.inputs if i.required)
 
-    columns = [column_of(header) for header in table.columns]
+    columns = [column_of(header) for header in (*table.columns, *table.clocks)]
     n_guessed = len({quantity_of(c) for c in columns} & {"speed", "position"})
     likely = [plant for plant in PLANTS.values() if is_driven(plant) and n_read(plant) > n_guessed]
     return max(likely, key=n_read, default=None)
@@ -363,7 +363,7 @@ def roles_in(table: CsvTable, plant: Plant, notes: list[str]) -> tuple[dict[str,
     """
     outputs = {o.name: (tuple(o.factors), tuple(SUFFIXES[o.unit])) for o in plant.outputs}
     ports = outputs | {i.name: ((*i.columns, i.name), (UNIT_ENDS.get(i.unit, ""),)) for i in plant.inputs}
-    columns = [column_of(header) for header in table.columns]
+    columns = [column_of(header) for header in (*table.columns, *table.clocks)]
     by_name = {header for read, _ in ports.values() for header in read}
     roles, headers = dict[str, FileColumn](), dict[str, str]()
     for name, (read, ends) in ports.items():
@@ -390,7 +390,7 @@ def roles_in(table: CsvTable, plant: Plant, notes: list[str]) -> tuple[dict[str,
 
 def roles_of(table: CsvTable) -> dict[str, FileColumn]:
     """Return quantity -> column of a file: the time, what was measured, and what drove it."""
-    columns = [column_of(header) for header in table.columns]
+    columns = [column_of(header) for header in (*table.columns, *table.clocks)]
     roles: dict[str, FileColumn] = {}
     for column in columns:
         roles.setdefault(quantity_of(column), column)
@@ -418,9 +418,10 @@ def time_of(table: CsvTable, columns: Sequence[FileColumn], roles: Mapping[str, 
     """Return the column of the time: by its name, else the first that rises."""
     unknown = [c for c in columns if c not in roles.values()]
     named = [c for c in columns if quantity_of(c) == "time"]
-    rising = [c for c in unknown if np.all(np.diff(table.columns[c.header]) > 0.0)]
+    known = table.columns | table.clocks
+    rising = [c for c in unknown if np.all(np.diff(known[c.header]) > 0.0)]
     if not named and not rising:
-        raise ArmidError(f"{table.where}: no column of {quoted(list(table.columns))} rises as a time does, a time "
+        raise ArmidError(f"{table.where}: no column of {quoted(list(table.headers))} rises as a time does, a time "
                          "in each row is expected")  # fmt: skip
     return [*named, *rising][0]
 
@@ -443,13 +444,16 @@ def new_headers(roles: Mapping[str, FileColumn], linear: bool, notes: list[str])
 
 def seconds_of(column: FileColumn, table: CsvTable, notes: list[str]) -> float:
     """Return what turns a column of time into seconds."""
-    times = table.numbers(column.header)
+    times = table.times(column.header)
     back = np.flatnonzero(np.diff(times) <= 0.0)
     if back.size:
         raise ArmidError(f"{table.file}: time does not rise from row {back[0] + 1} to row {back[0] + 2} of "
                          f"{quoted(column.header)}, {times[back[0]]:g} and {times[back[0] + 1]:g}: a time that rises "
                          "from row to row is expected")  # fmt: skip
     end, guess = column.end, ""
+    if column.header in table.clocks:
+        notes.append(f"time_s: the column {quoted(column.header)}, times of day, as seconds after the first row")
+        return 1.0
     if end not in SECONDS:
         end = "ms" if np.all(times == np.rint(times)) and np.median(np.diff(times)) >= 1.0 else "s"
         guess = f"; GUESS: it is in {end}"
@@ -469,8 +473,9 @@ def rewritten(
         if header not in table.headers:
             raise ArmidError(f"{table.where}: no column {quoted(header)} is there, as in the first file: files of one "
                              "machine with the same columns are expected")  # fmt: skip
-        table.numbers(header, gaps=header != time and renamed.get(header) not in drives)
-    times = table.columns[time] if second == 1.0 else np.round(table.columns[time] * second, 12)
+        if header != time:
+            table.numbers(header, gaps=renamed[header] not in drives)
+    times = table.times(time) if second == 1.0 else np.round(table.times(time) * second, 12)
     taken = {"time_s", *renamed.values()}
     # what is not used must not be taken for another input or output, as the counts of an encoder, which want its turn
     kept = {h: f"unused_{h}" if h in read or column_of(h).end in COUNT_ENDS else h for h in table.columns

@@ -8,6 +8,7 @@ import csv
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +22,11 @@ COLUMN = re.compile(r"([+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\n)*", re.ASCII)
 # A number with one comma for its point, and one with separators of thousands or the same digits with decimals.
 COMMA = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?", re.ASCII)
 THOUSANDS = re.compile(r"[+-]?[1-9]\d{0,2}([.,]\d{3})+", re.ASCII)
+# A time of day: with a date or without, and with a zone or without.
+CLOCK = re.compile(
+    r"(\d{4}-\d\d-\d\d[T ])?([01]?\d|2[0-3]):([0-5]\d):([0-5]\d)(?:[.,](\d+))? ?(Z|[+-]\d\d:?\d\d)?", re.ASCII
+)
+DAY = 86_400.0  # [s]
 # What programs write where they have no number.
 NO_NUMBER = ("", "nan", "na", "n/a", "null", "none")
 SEPARATORS = {",": "','", ";": "';'", "\t": "a tab"}
@@ -207,3 +213,23 @@ def columns_of(cells: Cells) -> Iterator[tuple[str, Array | tuple[int, str]]]:
         filled = ["nan" if cell.lower() in NO_NUMBER else cell for cell in column]
         wrong = next((i for i, cell in enumerate(filled) if cell != "nan" and not CELL_NUMBER.fullmatch(cell)), None)
         yield name, np.array(filled, dtype=np.float64) if wrong is None else (cells.lines[wrong], column[wrong])
+
+
+def clocks_of(cells: Cells) -> dict[str, Array]:
+    """Return columns of times of day: name -> seconds after the first, (n_rows,); without a date midnight may pass."""
+    clocks: dict[str, Array] = {}
+    for name, column in zip(cells.names, zip(*cells.rows, strict=True), strict=bool(cells.rows)):
+        read = [CLOCK.fullmatch(cell) for cell in column] if CLOCK.fullmatch(column[0]) else []
+        parts = [one.groups(default="") for one in read if one is not None]
+        if len(parts) < len(column) or len({(bool(part[0]), part[-1]) for part in parts}) > 1:
+            continue
+        try:
+            days = np.array([date.fromisoformat(part[0].strip("T ")).toordinal() if part[0] else 0 for part in parts])
+        except ValueError:
+            continue
+        times = np.array([3600 * int(h) + 60 * int(m) + int(s) + float(f"0.{f}") for _, h, m, s, f, _ in parts])
+        times = times - times[0] + DAY * (days - days[0])
+        if not parts[0][0]:
+            times[1:] += DAY * np.cumsum(np.diff(times) < -0.5 * DAY)
+        clocks[name] = np.round(times, 9)
+    return clocks

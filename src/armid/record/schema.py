@@ -4,6 +4,7 @@ A kind reads a value and knows its JSON Schema, so that readers and editors hold
 few stand here in place of a library, whose import alone would take a tenth of the time in which the program starts.
 """
 
+import re
 import tomllib
 from collections.abc import Callable, Collection, Iterable, Mapping
 from contextlib import suppress
@@ -375,5 +376,14 @@ def load_toml(path: Path, named: str = "") -> dict[str, Any]:
         raise ArmidError(f"{where} is nested too deeply, plain tables of TOML are expected") from error
     except ValueError as error:
         # TOMLDecodeError tells the line; numbers of too many digits come as a plain ValueError
-        hint = ": each record begins with [[records]]" if "('records',) twice" in str(error) else ""
-        raise ArmidError(f"{where} is not valid TOML: {str(error)[:200]}{hint}") from error
+        raise ArmidError(f"{where} is not valid TOML: {str(error)[:200]}{advice_on(str(error), content)}") from error
+
+
+def advice_on(error: str, content: bytes) -> str:
+    """Return what to do about a frequent fault of TOML, with a colon before it, "" for others."""
+    if "('records',) twice" in error:
+        return ": each record begins with [[records]]"
+    at = re.search(r"Invalid value \(at line (\d+)", error)
+    line = content.decode().split("\n")[int(at[1]) - 1] if at else ""
+    bare = re.fullmatch(r"\s*([\w.-]+)\s*=\s*([A-Za-z_][\w.-]*)\s*(#.*)?", line)
+    return f": text stands in quotes, {bare[1]} = {quoted(bare[2])}" if bare else ""

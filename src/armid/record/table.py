@@ -18,7 +18,7 @@ import numpy as np
 from armid.errors import ArmidError, nearest, quoted
 from armid.model import Array, Input, Output, Plant
 from armid.model.plant import SPEEDS
-from armid.record.dialect import COMMENTS, Cells, cells_of, check_names, columns_of, text_of
+from armid.record.dialect import COMMENTS, Cells, cells_of, check_names, clocks_of, columns_of, text_of
 from armid.record.record import RecordWarning
 from armid.units import SUFFIXES, TURN
 
@@ -42,7 +42,8 @@ class CsvTable:
 
     file: name to show. lines: of the file, counted from 1, on which the rows and the header stand. columns: header ->
     values, (n_rows,), NaN where a cell is empty. texts: of the columns that hold text, header -> its line, and what it
-    is and what is expected. counts_per_turn: of the encoder, None where it is not known.
+    is and what is expected. clocks: of those that hold times of day, header -> seconds after the first row, (n_rows,).
+    counts_per_turn: of the encoder, None where it is not known.
     """
 
     file: str
@@ -51,6 +52,7 @@ class CsvTable:
     counts_per_turn: float | None = None
     columns: dict[str, Array] = field(default_factory=dict)
     texts: dict[str, tuple[int, str]] = field(default_factory=dict)
+    clocks: dict[str, Array] = field(default_factory=dict)
 
     @property
     def where(self) -> str:
@@ -71,6 +73,10 @@ class CsvTable:
             raise ArmidError(f"{self.file}, line {self.lines[int(empty[0])]}: {header} has no number there, as in "
                              f"{empty.size} of {values.size} rows, a finite number in each is expected")  # fmt: skip
         return values
+
+    def times(self, header: str) -> Array:
+        """Return a column of times, (n_rows,): its numbers, or times of day as seconds after the first row."""
+        return self.clocks[header] if header in self.clocks else self.numbers(header)
 
     def factor(self, header: str, factor: float) -> float:
         """Return what turns a column into SI; of counts the turn of the encoder decides."""
@@ -114,7 +120,7 @@ def read_table(path: Path, file: str, counts_per_turn: float | None = None) -> C
     cells = cells_of(text, wide, file)
     if cells.assumed:
         warnings.warn(f"{file}: read with {', '.join(cells.assumed)}", RecordWarning, stacklevel=2)
-    table = CsvTable(file, cells.lines, cells.header_line, counts_per_turn)
+    table = CsvTable(file, cells.lines, cells.header_line, counts_per_turn, clocks=clocks_of(cells))
     return filled(table, columns_of(cells) if cells.rows else ())
 
 
@@ -122,14 +128,16 @@ def table_of(frame: "DataFrame", file: str, counts_per_turn: float | None = None
     """Return a table of pandas as if it were read from the CSV file that holds its columns."""
     names, lines = [str(name).strip() for name in frame.columns], tuple(range(2, len(frame) + 2))
     check_names(names, 1, file)
-    columns: list[tuple[str, Array | tuple[int, str]]] = []
+    columns, clocks = list[tuple[str, Array | tuple[int, str]]](), dict[str, Array]()
     for name, (_, column) in zip(names, frame.items(), strict=True):
         if column.dtype in ("float64", "int64"):
             columns.append((name, column.to_numpy(dtype=np.float64)))
         else:
             cells = ["" if empty else str(cell).strip() for cell, empty in zip(column, column.isna(), strict=True)]
-            columns += columns_of(Cells((name,), tuple((cell,) for cell in cells), lines, 1, ()))
-    return filled(CsvTable(file, lines, 1, counts_per_turn), columns if lines else ())
+            read = Cells((name,), tuple((cell,) for cell in cells), lines, 1, ())
+            columns += columns_of(read)
+            clocks |= clocks_of(read) if cells else {}
+    return filled(CsvTable(file, lines, 1, counts_per_turn, clocks=clocks), columns if lines else ())
 
 
 def filled(table: CsvTable, columns: Iterable[tuple[str, Array | tuple[int, str]]]) -> CsvTable:
@@ -178,7 +186,10 @@ def time_column(table: CsvTable) -> Array:
     """Return the times [s], (n_rows,); refuse a missing column, and times that do not increase, with ArmidError."""
     if TIME_HEADER not in table.headers:
         raise missing(table, "time column", [TIME_HEADER])
-    times = table.numbers(TIME_HEADER)
+    times = table.times(TIME_HEADER)
+    if TIME_HEADER in table.clocks:
+        warnings.warn(f"{table.file}: time_s holds times of day, which are read as seconds after the first row",
+                      RecordWarning, stacklevel=2)  # fmt: skip
     wrong = np.flatnonzero(np.diff(times) <= 0)
     if wrong.size:
         before, row = float(times[wrong[0]]), int(wrong[0]) + 1
