@@ -88,6 +88,14 @@ def test_a_column_that_is_not_used_is_not_read_as_another_input_or_output(run, t
     assert run("check", "motor").code == 0
 
 
+def test_a_drive_that_never_changes_is_asked_about(run, tmp_path):
+    times, _, speed, _ = wheel(5)
+    write(tmp_path / "motor.csv", "time_s,drive_V,angular_velocity_rad_s", times, np.full(N, 3.0), speed)
+    assert run("new", "campaign", "motor", "--from", "motor.csv").code == 0
+    checked = run("check", "motor")
+    assert (checked.code, "inputs: u is 3 in all samples of the train records" in checked.out) == (0, True)
+
+
 def test_one_file_of_steps_tells_that_the_drive_is_held(run, tmp_path):
     times, drive, speed, _ = wheel(4)
     for name, driven in (("chirp.csv", np.sin(times**2)), ("steps.csv", drive)):

@@ -80,6 +80,7 @@ def check_campaign(campaign: Campaign, effects: dict[str, Effect]) -> Iterator[C
             text += "" if is_finite else ": other ranges are expected, or equations that give a number there"
             yield ContractPoint(f"moves in {replay.name}", is_finite, text)
         yield from far_from_typical(campaign, model.plant)
+        yield from never_changing(campaign, model.plant)
         yield from plausible(data_issues(campaign, model, space))
     except ArmidError as error:
         yield ContractPoint("model", False, str(error))
@@ -98,6 +99,16 @@ def far_from_typical(campaign: Campaign, plant: Plant) -> Iterator[ContractPoint
             text = f"{', '.join(files)}: up to {max(largest[f] for f in files):.3g} {of.unit}, while {low:g} to "
             text += f"{high:g} {of.unit} is typical of plant '{plant.name}': look at the unit of the column"
             yield ContractPoint(f"input {of.name}", True, text, unclear=True)
+
+
+def never_changing(campaign: Campaign, plant: Plant) -> Iterator[ContractPoint]:
+    """Ask about inputs where none that a plant requires changes in any train record."""
+    columns = {i.name: np.concatenate([p.manoeuvre.inputs[i.name] for r in campaign.train for p in r.pieces])
+               for i in plant.inputs if i.required and campaign.train}  # fmt: skip
+    if columns and all(np.ptp(values) == 0.0 for values in columns.values()):
+        said = ", ".join(f"{name} is {values[0]:g}" for name, values in columns.items())
+        text = f"{said} in all samples of the train records: a drive that moves the machine is expected to change"
+        yield ContractPoint("inputs", True, text, unclear=True)
 
 
 def ready_at(candidate: Array, record: Record, model: Model) -> ReadyRecord:
