@@ -498,9 +498,10 @@ def carried_sentence(loop: ClosedLoop) -> str:
     factors = [rms(raw) / level.total for raw, level in zip(unseen.raw, unseen.data.levels,
                                                                                  strict=True)]  # fmt: skip
     worst = int(np.argmax(np.nan_to_num(factors, nan=np.inf)))
-    missed = f"{unseen.data.each[worst].file} is missed by {factors[worst]:.3g} times its noise"
-    if not np.isfinite(factors[worst]):
-        missed = f"{unseen.data.each[worst].file} makes the simulation diverge"
+    factor, file = factors[worst], unseen.data.each[worst].file
+    missed = f"the error on {file} is {f'{factor:,.0f}' if factor >= 100.0 else f'{factor:.3g}'} times the noise"
+    if not np.isfinite(factor):
+        missed = f"{file} makes the simulation diverge"
     alone = ""
     if sum(over_noise(judged.train, unseen)) == 1:
         alone = " No other held-out record is missed: this one may itself be faulty, for example late or scaled."
@@ -508,7 +509,7 @@ def carried_sentence(loop: ClosedLoop) -> str:
         named = f"With {' + '.join(loop.effects)} the declared model" if loop.effects else "The declared model"
         return f"{named} leaves more than noise on the train records. {missed_sentences(judged.missed)[0]}{alone}"
     if loop.withdrawn is None:
-        return (f"Only noise remains on the train records, but of the held-out records {missed}: something acts there "
+        return (f"Only noise remains on the train records. Of those held out, {missed}: something acts there "
                 f"that the train records do not show.{alone}")  # fmt: skip
     last = loop.after.holdout
     assert last is not None
