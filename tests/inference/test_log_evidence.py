@@ -9,19 +9,24 @@ import pytest
 from scipy.stats import multivariate_normal, norm
 
 from armid.estimation.constants import NAMED
+from armid.inference import prepared
 from armid.inference.decisions import PriorBeliefs, calibration
 from armid.inference.evidence import (
     SCALES_OF_STRENGTH,
     Expansion,
     Scale,
+    expansion_of,
     forecast,
     log_normal,
     log_strengths,
     log_tails,
 )
 from armid.inference.kinds.hypothesis import Hypothesis, Proposal
-from armid.inference.posterior import Atom, Posterior, most_odds, truncated
+from armid.inference.posterior import Atom, Posterior, most_odds, truncated, unbounded
+from armid.inference.search import begun
+from armid.model import EFFECTS, Model
 from armid.problem.cover import Cover
+from armid.record import read_campaign
 
 N, RNG = 60, np.random.default_rng(11)
 JACOBIAN, OTHERS = RNG.normal(size=(N, 2)), RNG.normal(size=(N, 1))
@@ -242,3 +247,19 @@ def test_strengths_that_the_records_show_only_together_count_with_one_joint_prio
     alone = [np.mean([norm.pdf(v, 0.0, np.hypot(d, s)) for s in SCALES_OF_STRENGTH])
              for v, d in zip(value, deviations, strict=True)]  # fmt: skip
     assert (abs(np.sum(np.log(alone)) - exact) > 0.5) == (together > 0.0)
+
+
+def test_a_parameter_at_its_bound_hides_nothing_of_the_others(tmp_path, write_axis):
+    """Of an axis without friction, a declared slope of friction rests at 0 for half of all noises."""
+    rng, held = np.random.default_rng(7), []
+    for i in range(6):
+        speed = 4.0 * np.arange(401) / 200.0 + 0.02 * rng.standard_normal(401)
+        campaign = read_campaign(write_axis(tmp_path / str(i), speed))
+        library, declared = prepared(Model(campaign.plant) + EFFECTS["viscous"], campaign, {})
+        scale = begun(library, declared).scale()
+        about = expansion_of(declared, scale, library)
+        slopes = about.unknowns[:, :2]
+        linear = np.sqrt(scale.variance(declared.chi2) * np.diag(np.linalg.inv(scale.weight * slopes.T @ slopes)))
+        np.testing.assert_allclose(np.sqrt(np.diag(unbounded(about))), linear, rtol=0.1)
+        held.append(declared.values["viscous.slope"] == 0.0)
+    assert 0 < sum(held) < 6

@@ -44,10 +44,10 @@ TRYING = {"analysis": "armid report out/STUDY --plugin {}"}
 FOLDER_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
 # The made-up axis: inertia [kg m2], viscous friction [N m s/rad], noise of the speed [rad/s].
 INERTIA, FRICTION_OF_SHAFT, NOISE_OF_RECORDS = 0.05, 0.03, 0.01
-RECORD_INTERVAL, RECORD_SAMPLES = 0.005, 401
+RECORD_INTERVAL, RECORD_SAMPLES = 0.005, 501
 # File -> size [N m] and frequency [Hz] of the drive, seed of the noise.
 RECORDS = {"synthetic_train.csv": (1.0, 0.8, 1), "synthetic_holdout.csv": (0.7, 1.3, 2)}
-DRIVEN_FROM_S = 0.1
+DRIVEN_FROM_S = 0.5
 DIGITS = 6
 
 

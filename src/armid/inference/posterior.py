@@ -326,11 +326,14 @@ def confirmed_slopes(fit: Fit, columns: Array, flat: Array, weight: float) -> Ar
     base = fit.base if fit.base is not None and fit.others else fit.records
     base, unknowns = base.plain, [f.unknown for f in fit.others]
     here, root = np.concatenate([fit.z, [f.value for f in fit.others]]), np.sqrt(weight)
-    # What a bound holds stays there.
-    stays = np.append(held_by_bound(fit.records.space, fit.x), np.zeros(n - n_free, dtype=np.bool_))
-    for _ in range(MOST_LOOKS):
-        axes = principal_axes(columns, flat, weight, n)
-        moves = np.where(stays[:, np.newaxis], 0.0, DEVIATIONS * axes)
+    # What a bound holds stays there: the axes are those of the others.
+    held = np.append(held_by_bound(fit.records.space, fit.x), np.zeros(n - n_free, dtype=np.bool_))
+    moving = np.flatnonzero(~held)
+    counted = np.append(moving, np.arange(n, columns.shape[1]))
+    for _ in range(MOST_LOOKS if moving.size else 0):
+        axes = np.zeros((n, moving.size))
+        axes[moving] = principal_axes(columns[:, counted], flat[counted], weight, moving.size)
+        moves = DEVIATIONS * axes
         shares = room(here[:n_free], moves[:n_free])
         moves = shares * moves
         along, foretold = root * columns[:, :n] @ axes, weight * np.sum((columns[:, :n] @ moves) ** 2, axis=0)
@@ -338,15 +341,14 @@ def confirmed_slopes(fit: Fit, columns: Array, flat: Array, weight: float) -> Ar
         def residuals(rows: Array) -> Array:
             return np.asarray(root * residuals_at(base, unknowns, rows[:, n_free:], rows[:, :n_free]))
 
-        free_axes = np.where(stays[:, np.newaxis], 0.0, axes)
-        rise = rises(residuals, here, moves, free_axes, along, root * fit.residual, foretold, n_free)
+        rise = rises(residuals, here, moves, axes, along, root * fit.residual, foretold, n_free)
         matters = np.isfinite(rise) & (foretold > LEAST_RISE * shares**2)
         believed = np.where(matters, np.clip(rise / np.maximum(foretold, 1e-300), 0.0, 1.0), 1.0)
         if (believed >= BELIEVED).all():
             break
         kept = np.where(believed < BELIEVED, np.sqrt(believed), 1.0)
-        changed = columns[:, :n] @ (axes * kept) @ np.linalg.inv(axes)
-        columns = np.hstack([changed, columns[:, n:]])
+        columns = columns.copy()
+        columns[:, moving] = columns[:, :n] @ (axes * kept) @ np.linalg.inv(axes[moving])
     return columns
 
 
@@ -359,7 +361,7 @@ def rises(
     Where the way bends, the other unknowns follow it. residuals: of rows of unknowns. moves: along each axis, as
     columns. along: the slopes along the axes. residual: at the estimate. foretold: the rise that the slopes foretell.
     """
-    n, rows = len(here), np.concatenate([here + moves.T, here - moves.T])
+    n, rows = moves.shape[1], np.concatenate([here + moves.T, here - moves.T])
     rise, bends = np.full(n, np.inf), np.ones(n, dtype=np.bool_)
     for _ in range(MOST_ANSWERS):
         tried, before = residuals(rows), rise
