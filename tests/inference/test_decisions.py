@@ -18,7 +18,7 @@ NUMERICS = {
                                               "WIDE", "FORETOLD", "UNTOLD"),
     "budgets of computing": ("FEWEST_IN_BUNDLES", "MOST_IN_VAIN", "MOST_EFFECTS", "MOST_OF_SIZE", "MOST_RIVALS",
                              "FEWEST_OF_PART", "FEW_PLACES", "SPARED"),
-    "estimate of the noise": ("FEWEST_FOR_COLOUR", "FEWEST_ORDINATES", "MOST_LAGS_OF_NOISE", "LINE_OF_MAINS",
+    "estimate of the noise": ("FEWEST_FOR_COLOUR", "FEWEST_ORDINATES", "MOST_LAGS_OF_NOISE",
                               "MOST_BRIDGED", "STILL", "EVEN_SPEED", "MISFIT", "ENGINE_ERRORS", "CHANCE_OF_COLOUR",
                               "CERTAIN", "TRIFLE"),
     "what can be asked of records at all": ("FEWEST_RECORDS", "FEWEST_OTHERS", "MOVED", "SAME_PORT", "SAME_VARIABLE",

@@ -16,7 +16,7 @@ from armid.estimation.noise_model import (
     white_level,
     yule_walker,
 )
-from armid.inference.checks import motion_phases, spectra, square_along, time_in_words
+from armid.inference.checks import mains_hum, motion_phases, spectra, square_along, time_in_words
 from armid.inference.model import decomposed
 from armid.inference.whitening import soundness
 from armid.model import Manoeuvre, Output
@@ -134,3 +134,17 @@ def test_a_record_without_a_rest_adds_no_ordinate():
     rest = np.random.default_rng(1).normal(size=400)
     alone = SimpleNamespace(data=SimpleNamespace(each=(record,), levels=(level,)))
     assert spectra([rest, np.empty(0)], seen, []) == spectra([rest], alone, [])
+
+
+@pytest.mark.parametrize("n_rests", [1, 4])
+def test_hum_of_the_mains_is_seen_in_a_rest_and_not_in_noise(n_rests):
+    rng, times = np.random.default_rng(5), 0.001 * np.arange(300)
+
+    def humming(size):
+        rests = [rng.standard_normal(300) + size * np.sin(2.0 * np.pi * (50.04 * times + rng.random()))
+                 for _ in range(n_rests)]  # fmt: skip
+        each = [SimpleNamespace(rest=r, spacing=0.001, noise=SimpleNamespace(source="rest")) for r in rests]
+        return mains_hum(SimpleNamespace(data=SimpleNamespace(each=each)))
+
+    assert sum(bool(humming(0.0)) for _ in range(100)) <= 4
+    assert all(any(low < 50.0 < high for low, high in humming(1.0)) for _ in range(20))

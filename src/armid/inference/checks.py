@@ -31,9 +31,9 @@ LAGS, N_BINS = 40, 12
 BANDS_HZ = (0.0, 5.0, 12.0, 25.0, 50.0, 100.0, 250.0, np.inf)
 # Neighbouring ordinates of a tapered periodogram tell partly the same; a band needs so many of the rest.
 INDEPENDENT, FEWEST_ORDINATES = 0.5, 4
-# Frequencies of mains and number of their harmonics. LINE_OF_MAINS: power of a line of a rest over that of its
-# neighbours; NEXT_TO_LINE: distance of these, in widths 1/T of the rest.
-MAINS_HZ, HARMONICS, LINE_OF_MAINS, NEXT_TO_LINE = (50.0, 60.0), 5, 4.0, 3.0
+# Frequencies of mains and number of their harmonics. A line is compared with so many frequencies to either side, which
+# are NEXT_TO_LINE widths 1/T of the rest apart.
+MAINS_HZ, HARMONICS, BESIDE_LINE, NEXT_TO_LINE = (50.0, 60.0), 5, 3, 3.0
 # So small a p-value stays significant whatever the number of tests.
 CERTAIN = 1e-7
 # Products of columns whose share of the largest is below this are rounding.
@@ -503,22 +503,28 @@ def bridged(signal: Array, replay: Replay) -> Array:
 
 def mains_hum(seen: Residuals) -> list[tuple[float, float]]:
     """Return the stretches of frequency, (low, high) [Hz], in which the rests show the mains or a harmonic of it."""
-    rests = [(r.rest - np.mean(r.rest), r.spacing) for r in seen.data.each if r.noise.source == "rest"]
+    rests = [((r.rest - np.mean(r.rest)) / max(float(np.std(r.rest)), 1e-300), r.spacing) for r in seen.data.each
+             if r.noise.source == "rest"]  # fmt: skip
     if not rests:
         return []
     width = NEXT_TO_LINE / min(len(x) * step for x, step in rests)
 
     def power(frequency: float) -> float:
-        waves = [
-            np.hanning(len(x)) * x * np.exp(-2j * np.pi * frequency * step * np.arange(len(x))) for x, step in rests
-        ]
-        return float(sum(abs(w.sum()) ** 2 for w in waves))
+        tapers = (np.hanning(len(x)) * np.exp(-2j * np.pi * frequency * step * np.arange(len(x))) for x, step in rests)
+        return float(sum(abs(x @ taper) ** 2 / len(x) for (x, _), taper in zip(rests, tapers, strict=True)))
 
     highest = min(0.5 / step for _, step in rests) - width
-    lines = (f * k for f in MAINS_HZ for k in range(1, HARMONICS + 1) if width < f * k < highest)
-    return [
-        (f - width, f + width) for f in lines if 2.0 * power(f) > LINE_OF_MAINS * (power(f - width) + power(f + width))
-    ]
+    lines = sorted({f * k for f in MAINS_HZ for k in range(1, HARMONICS + 1) if width < f * k < highest})
+    found = []
+    for f in lines:
+        beside = [
+            g for k in range(1, BESIDE_LINE + 1) for g in (f - k * width, f + k * width) if 0.0 < g < highest + width
+        ]
+        ratio = len(beside) * power(f) / sum(map(power, beside))
+        # of noise the ratio of such sums of squares has this distribution
+        if fdtrc(2 * len(rests), 2 * len(rests) * len(beside), ratio) < SIGNIFICANCE / len(lines):
+            found.append((f - width, f + width))
+    return found
 
 
 def without_lines(signal: Array, frequencies: Sequence[float], interval: float) -> Array:

@@ -186,7 +186,10 @@ class Inference:
         for name, one in self.of_fit(self.in_force).items():
             if name in self.posterior.parameters:
                 causes = tuple(self.posterior.causes(name, float(of_noise[name]), beside))
-                low, high = in_box(fit.records.space, name, *self.posterior.interval(name))
+                low, high = self.posterior.interval(name)
+                if not self.posterior.best_is_unknown:  # what counts all holds what counts noise alone
+                    low, high = np.fmin(low, one.noise_low), np.fmax(high, one.noise_high)
+                low, high = in_box(fit.records.space, name, float(low), float(high))
                 intervals[name] = replace(one, low=low, high=high, causes=causes)
         return intervals
 
