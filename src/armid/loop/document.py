@@ -499,7 +499,7 @@ def carried_sentence(loop: ClosedLoop) -> str:
                                                                                  strict=True)]  # fmt: skip
     worst = int(np.argmax(np.nan_to_num(factors, nan=np.inf)))
     factor, file = factors[worst], unseen.data.each[worst].file
-    missed = f"the error on {file} is {f'{factor:,.0f}' if factor >= 100.0 else f'{factor:.3g}'} times the noise"
+    missed = f"the error on {file} is {float(f'{factor:.3g}'):,g} times the noise"
     if not np.isfinite(factor):
         missed = f"{file} makes the simulation diverge"
     alone = ""
