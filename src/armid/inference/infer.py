@@ -38,7 +38,7 @@ from armid.inference.library import Library, library_of
 from armid.inference.model import Fit, unless_diverged, with_data_of
 from armid.inference.moves import Exploration, simpler
 from armid.inference.posterior import CONSTANTS_TEXT, Posterior, posterior, spread
-from armid.inference.search import explore, without_denied
+from armid.inference.search import explore, is_named, without_denied
 from armid.inference.unknowns import freed
 from armid.inference.whitening import whitened, with_answers
 from armid.model import EFFECTS, Effect, Model
@@ -105,8 +105,7 @@ class Inference:
         Those with an effect at its null are left out.
         """
         fits = self.exploration.fits
-        ranked = [(m, p) for m, p in self.exploration.ranked()
-                  if not (any(h.kind == "unknown" for h in m) or fits[m].has_idle_effect)]  # fmt: skip
+        ranked = [(m, p) for m, p in self.exploration.ranked() if is_named(m) and not fits[m].has_idle_effect]
         sums: dict[frozenset[tuple[str, str]], float] = {}
         for model, p in ranked:
             names = frozenset(h.public for h in model)

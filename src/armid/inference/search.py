@@ -74,15 +74,15 @@ def explore(library: Library, declared: Fit, until: Callable[[Fit], bool] = lamb
     """
     exploration = begun(library, declared)
     take_from_some_records(exploration)
-    if expand_all(exploration, None, until) and add_unknown(exploration):
-        expand_all(exploration, None, until)
+    if expand_all(exploration, None, until):
+        add_unknown(exploration)
     if until(exploration.fits[exploration.ranked()[0][0]]):
         return exploration
     add_unknown(exploration)
     finish_all(exploration)
     # Far from the noise each leads to a larger model that was never expanded.
     for _ in range(MOST_ENDS if is_near(exploration) else 1):
-        best = exploration.ranked()[0][0]
+        best = next(m for m, _ in exploration.ranked() if is_named(m))
         if best in exploration.forecasts or exploration.fits[best].records.data.cover is not None:
             break
         # Drops reached this model: its own additions and swaps were never fitted.
@@ -245,25 +245,25 @@ def without_denied(exploration: Exploration, denied: Hypotheses, standing: Hypot
     return left
 
 
-def add_unknown(exploration: Exploration) -> bool:
-    """Add a signal without a form to some models; return whether a model was added.
+def add_unknown(exploration: Exploration) -> None:
+    """Add a signal without a form to some models, once.
 
     To the declared one and the best ones with one effect fewer than the best: several wrong names together can explain
     an effect that the library does not hold. Where the best model leaves more than noise, to the best ones as well.
     """
     ranked = exploration.ranked()
-    if any(h.kind == "unknown" for m in exploration.fits for h in m):
-        return False
+    if not all(map(is_named, exploration.fits)):
+        return
     best = ranked[0][0]
     models = [*simpler(exploration, best)[:N_BESIDE], *([frozenset[Hypothesis]()] if best else [])]
     if is_significant(exploration.fits[best]):
         models = [*(m for m, _ in ranked[:N_BESIDE]), *models]
-    return add_signals(exploration, list(dict.fromkeys(models)))
+    add_signals(exploration, list(dict.fromkeys(models)))
 
 
-def add_signals(exploration: Exploration, models: Sequence[Hypotheses]) -> bool:
-    """Add signals without a form to some models; return whether a model was added."""
-    library, scale, before = exploration.library, exploration.scale(), len(exploration.fits)
+def add_signals(exploration: Exploration, models: Sequence[Hypotheses]) -> None:
+    """Add signals without a form to some models."""
+    library, scale = exploration.library, exploration.scale()
     limit = limit_of(exploration, scale)
     for model in models:
         fit = exploration.fits[model]
@@ -273,7 +273,6 @@ def add_signals(exploration: Exploration, models: Sequence[Hypotheses]) -> bool:
             for key, make in trial_of(exploration, model, about, one, limit):
                 if key not in exploration.refused:
                     exploration.take_or_refuse(key, make())
-    return len(exploration.fits) > before
 
 
 def next_model(exploration: Exploration) -> Hypotheses | None:
@@ -281,13 +280,14 @@ def next_model(exploration: Exploration) -> Hypotheses | None:
 
     Where the best model leaves more than noise, the best effect-only models of each size up to its own may lead on as
     well: a strong second effect can mislead the choice of the first. Far from the noise these come first (a beam).
-    Where some records were searched first, the beam was expanded there.
+    Where some records were searched first, the beam was expanded there. Models with something unknown are not expanded:
+    names next to it do not count.
     """
     ranked = exploration.ranked()
     best, top = ranked[0]
     expanded = [(m, value) for m, value in ranked if m in exploration.forecasts]
     reach = HOPELESS if is_near(exploration) else WINDOW
-    near = [m for m, value in ranked if value > top - (reach if is_form_of(m, best) else WINDOW)
+    near = [m for m, value in ranked if is_named(m) and value > top - (reach if is_form_of(m, best) else WINDOW)
             and not (is_outdone(m, value, ranked) or has_expanded_form(m, value, expanded))]  # fmt: skip
     is_left = is_significant(exploration.fits[best]) and exploration.fits[best].records.data.cover is None
     if is_left and not exploration.is_led:
@@ -296,6 +296,10 @@ def next_model(exploration: Exploration) -> Hypotheses | None:
         beam = [m for n in range(1, max(len(best), 1) + 1) for m in [m for m in plain if len(m) == n][:BEAM]]
         near = [*near, *beam] if is_near(exploration) else [*beam, *near]
     return next((m for m in near if m not in exploration.forecasts and len(m) < MOST_EFFECTS), None)
+
+
+def is_named(model: Hypotheses) -> bool:
+    return all(h.kind != "unknown" for h in model)
 
 
 def has_expanded_form(model: Hypotheses, value: float, expanded: Sequence[tuple[Hypotheses, float]]) -> bool:
