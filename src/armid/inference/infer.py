@@ -186,7 +186,8 @@ class Inference:
             if name in self.posterior.parameters:
                 causes = tuple(self.posterior.causes(name, float(of_noise[name]), beside))
                 low, high = self.posterior.interval(name)
-                if not self.posterior.best_is_unknown:  # what counts all holds what counts noise alone
+                # what counts all holds what counts noise alone, and not what was known before
+                if not (self.posterior.best_is_unknown or name in library.known):
                     low, high = np.fmin(low, one.noise_low), np.fmax(high, one.noise_high)
                 low, high = in_box(fit.records.space, name, float(low), float(high))
                 intervals[name] = replace(one, low=low, high=high, causes=causes)
