@@ -82,8 +82,9 @@ def explore(library: Library, declared: Fit, until: Callable[[Fit], bool] = lamb
     finish_all(exploration)
     # Far from the noise each leads to a larger model that was never expanded.
     for _ in range(MOST_ENDS if is_near(exploration) else 1):
-        best = next(m for m, _ in exploration.ranked() if is_named(m))
-        if best in exploration.forecasts or exploration.fits[best].records.data.cover is not None:
+        best = exploration.ranked()[0][0]
+        is_expanded = best in exploration.forecasts or exploration.fits[best].records.data.cover is not None
+        if is_expanded or not is_named(best):
             break
         # Drops reached this model: its own additions and swaps were never fitted.
         expand(exploration, best)
