@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
+from pandas import DataFrame, Timestamp, to_timedelta
 from reading_whatever import many
 
 from armid.errors import ArmidError
 from armid.record import RecordWarning
-from armid.record.table import read_table, time_column
+from armid.record.table import read_table, table_of, time_column
 
 NAMES = ("time_s", "angular_velocity_rad_s", "drive_V")
 # What spreadsheets, loggers and languages print.
@@ -161,3 +162,12 @@ def test_other_times_are_refused(tmp_path, cells):
     path.write_text("time_s,w\n" + "".join(f"{cell},1\n" for cell in cells))
     with pytest.raises(ArmidError, match=r"time_s is '.*', a finite number is expected"):
         time_column(read_table(path, "a.csv"))
+
+
+def test_times_of_pandas_are_read_and_a_table_without_rows_is_refused():
+    after = np.array([0.0, 0.25, 1.0])
+    frame = DataFrame({"time_s": Timestamp("2024-02-28 23:59:59.5") + to_timedelta(after, unit="s")})
+    with pytest.warns(RecordWarning, match="times of day"):
+        np.testing.assert_allclose(time_column(table_of(frame, "a.csv")), after, rtol=0, atol=1e-9)
+    with pytest.raises(ArmidError, match="holds no samples"):
+        table_of(DataFrame(columns=["time_s", "w"]), "a.csv")

@@ -146,5 +146,7 @@ def test_hum_of_the_mains_is_seen_in_a_rest_and_not_in_noise(n_rests):
         each = [SimpleNamespace(rest=r, spacing=0.001, noise=SimpleNamespace(source="rest")) for r in rests]
         return mains_hum(SimpleNamespace(data=SimpleNamespace(each=each)))
 
+    still = SimpleNamespace(rest=np.full(300, 0.5), spacing=0.001, noise=SimpleNamespace(source="rest"))
+    assert mains_hum(SimpleNamespace(data=SimpleNamespace(each=[still] * n_rests))) == []
     assert sum(bool(humming(0.0)) for _ in range(100)) <= 4
     assert all(any(low < 50.0 < high for low, high in humming(1.0)) for _ in range(20))

@@ -503,15 +503,17 @@ def bridged(signal: Array, replay: Replay) -> Array:
 
 def mains_hum(seen: Residuals) -> list[tuple[float, float]]:
     """Return the stretches of frequency, (low, high) [Hz], in which the rests show the mains or a harmonic of it."""
-    rests = [((r.rest - np.mean(r.rest)) / max(float(np.std(r.rest)), 1e-300), r.spacing) for r in seen.data.each
-             if r.noise.source == "rest"]  # fmt: skip
+    sounding = [r for r in seen.data.each if r.noise.source == "rest" and np.ptp(r.rest) > 0.0]
+    # tapered, and all equally loud
+    rests = [(np.hanning(len(x)) * (x - np.mean(x)) / (np.std(x) * np.sqrt(len(x))), r.spacing)
+             for r in sounding for x in (r.rest,)]  # fmt: skip
     if not rests:
         return []
     width = NEXT_TO_LINE / min(len(x) * step for x, step in rests)
 
     def power(frequency: float) -> float:
-        tapers = (np.hanning(len(x)) * np.exp(-2j * np.pi * frequency * step * np.arange(len(x))) for x, step in rests)
-        return float(sum(abs(x @ taper) ** 2 / len(x) for (x, _), taper in zip(rests, tapers, strict=True)))
+        waves = ((x, np.exp(-2j * np.pi * frequency * step * np.arange(len(x)))) for x, step in rests)
+        return float(sum(abs(x @ wave) ** 2 for x, wave in waves))
 
     highest = min(0.5 / step for _, step in rests) - width
     lines = sorted({f * k for f in MAINS_HZ for k in range(1, HARMONICS + 1) if width < f * k < highest})

@@ -218,7 +218,7 @@ def columns_of(cells: Cells) -> Iterator[tuple[str, Array | tuple[int, str]]]:
 def clocks_of(cells: Cells) -> dict[str, Array]:
     """Return columns of times of day: name -> seconds after the first, (n_rows,); without a date midnight may pass."""
     clocks: dict[str, Array] = {}
-    for name, column in zip(cells.names, zip(*cells.rows, strict=True), strict=bool(cells.rows)):
+    for name, column in zip(cells.names, zip(*cells.rows, strict=True), strict=True):
         read = [CLOCK.fullmatch(cell) for cell in column] if CLOCK.fullmatch(column[0]) else []
         parts = [one.groups(default="") for one in read if one is not None]
         if len(parts) < len(column) or len({(bool(part[0]), part[-1]) for part in parts}) > 1:

@@ -120,7 +120,8 @@ def read_table(path: Path, file: str, counts_per_turn: float | None = None) -> C
     cells = cells_of(text, wide, file)
     if cells.assumed:
         warnings.warn(f"{file}: read with {', '.join(cells.assumed)}", RecordWarning, stacklevel=2)
-    table = CsvTable(file, cells.lines, cells.header_line, counts_per_turn, clocks=clocks_of(cells))
+    table = CsvTable(file, cells.lines, cells.header_line, counts_per_turn)
+    table.clocks.update(clocks_of(cells) if cells.rows else {})
     return filled(table, columns_of(cells) if cells.rows else ())
 
 
@@ -128,7 +129,10 @@ def table_of(frame: "DataFrame", file: str, counts_per_turn: float | None = None
     """Return a table of pandas as if it were read from the CSV file that holds its columns."""
     names, lines = [str(name).strip() for name in frame.columns], tuple(range(2, len(frame) + 2))
     check_names(names, 1, file)
-    columns, clocks = list[tuple[str, Array | tuple[int, str]]](), dict[str, Array]()
+    table = CsvTable(file, lines, 1, counts_per_turn)
+    if not lines:
+        return filled(table, ())
+    columns: list[tuple[str, Array | tuple[int, str]]] = []
     for name, (_, column) in zip(names, frame.items(), strict=True):
         if column.dtype in ("float64", "int64"):
             columns.append((name, column.to_numpy(dtype=np.float64)))
@@ -136,8 +140,8 @@ def table_of(frame: "DataFrame", file: str, counts_per_turn: float | None = None
             cells = ["" if empty else str(cell).strip() for cell, empty in zip(column, column.isna(), strict=True)]
             read = Cells((name,), tuple((cell,) for cell in cells), lines, 1, ())
             columns += columns_of(read)
-            clocks |= clocks_of(read) if cells else {}
-    return filled(CsvTable(file, lines, 1, counts_per_turn, clocks=clocks), columns if lines else ())
+            table.clocks.update(clocks_of(read))
+    return filled(table, columns)
 
 
 def filled(table: CsvTable, columns: Iterable[tuple[str, Array | tuple[int, str]]]) -> CsvTable:
