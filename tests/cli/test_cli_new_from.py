@@ -88,6 +88,16 @@ def test_a_column_that_is_not_used_is_not_read_as_another_input_or_output(run, t
     assert run("check", "motor").code == 0
 
 
+def test_times_of_day_in_some_files_alone_are_refused(refused, tmp_path):
+    for file, clock in (("a.csv", "10:00:"), ("b.csv", "")):
+        rows = [f"{clock}{i},0,{i}" for i in range(10, 60)]
+        (tmp_path / file).write_text("\n".join(["Time,drive_V,angle_deg", *rows]))
+    for files, words in ((("a.csv", "b.csv"), "numbers, times of day are expected"),
+                         (("b.csv", "a.csv"), "times of day, numbers are expected")):  # fmt: skip
+        said = refused("new", "campaign", "m", "--from", *files)
+        assert f"line 1: 'Time' holds {words}, as in the first file" in said
+
+
 def test_a_drive_that_never_changes_is_asked_about(run, tmp_path):
     times, _, speed, _ = wheel(5)
     write(tmp_path / "motor.csv", "time_s,drive_V,angular_velocity_rad_s", times, np.full(N, 3.0), speed)

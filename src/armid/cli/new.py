@@ -257,6 +257,11 @@ def column_of(header: str) -> FileColumn:
     return FileColumn(header, words.strip().lower().replace(" ", "_"), end, "" if end else unit, factor)
 
 
+def columns_in(table: CsvTable) -> list[FileColumn]:
+    """Return the columns of a file that hold numbers or times of day."""
+    return [column_of(header) for header in (*table.columns, *table.clocks)]
+
+
 def quantity_of(column: FileColumn) -> str:
     """Return what a column is: a key of WORDS, "" for nothing that is known."""
     parts = set(re.split(r"[^a-z]+", column.words))
@@ -326,7 +331,7 @@ def plant_of(table: CsvTable) -> Plant | None:
     def is_driven(plant: Plant) -> bool:
         return all(any(h in table.headers for h in i.columns) for i in plant.inputs if i.required)
 
-    columns = [column_of(header) for header in (*table.columns, *table.clocks)]
+    columns = columns_in(table)
     n_guessed = len({quantity_of(c) for c in columns} & {"speed", "position"})
     likely = [plant for plant in PLANTS.values() if is_driven(plant) and n_read(plant) > n_guessed]
     return max(likely, key=n_read, default=None)
@@ -363,8 +368,8 @@ def roles_in(table: CsvTable, plant: Plant, notes: list[str]) -> tuple[dict[str,
     """
     outputs = {o.name: (tuple(o.factors), tuple(SUFFIXES[o.unit])) for o in plant.outputs}
     ports = outputs | {i.name: ((*i.columns, i.name), (UNIT_ENDS.get(i.unit, ""),)) for i in plant.inputs}
-    columns = [column_of(header) for header in (*table.columns, *table.clocks)]
-    by_name = {header for read, _ in ports.values() for header in read}
+    columns = columns_in(table)
+    by_name = headers_of(plant)
     roles, headers = dict[str, FileColumn](), dict[str, str]()
     for name, (read, ends) in ports.items():
         spare = [c for c in columns if c not in roles.values() and c.header not in by_name and not c.unit]
@@ -390,7 +395,7 @@ def roles_in(table: CsvTable, plant: Plant, notes: list[str]) -> tuple[dict[str,
 
 def roles_of(table: CsvTable) -> dict[str, FileColumn]:
     """Return quantity -> column of a file: the time, what was measured, and what drove it."""
-    columns = [column_of(header) for header in (*table.columns, *table.clocks)]
+    columns = columns_in(table)
     roles: dict[str, FileColumn] = {}
     for column in columns:
         roles.setdefault(quantity_of(column), column)
@@ -442,8 +447,8 @@ def new_headers(roles: Mapping[str, FileColumn], linear: bool, notes: list[str])
     return headers
 
 
-def seconds_of(column: FileColumn, table: CsvTable, notes: list[str]) -> float:
-    """Return what turns a column of time into seconds."""
+def seconds_of(column: FileColumn, table: CsvTable, notes: list[str]) -> float | None:
+    """Return what turns a column of time into seconds; None of times of day, which are read in seconds."""
     times = table.times(column.header)
     back = np.flatnonzero(np.diff(times) <= 0.0)
     if back.size:
@@ -453,7 +458,7 @@ def seconds_of(column: FileColumn, table: CsvTable, notes: list[str]) -> float:
     end, guess = column.end, ""
     if column.header in table.clocks:
         notes.append(f"time_s: the column {quoted(column.header)}, times of day, as seconds after the first row")
-        return 1.0
+        return None
     if end not in SECONDS:
         end = "ms" if np.all(times == np.rint(times)) and np.median(np.diff(times)) >= 1.0 else "s"
         guess = f"; GUESS: it is in {end}"
@@ -462,20 +467,26 @@ def seconds_of(column: FileColumn, table: CsvTable, notes: list[str]) -> float:
 
 
 def rewritten(
-    table: CsvTable, renamed: Mapping[str, str], time: str, second: float, drives: Mapping[str, float],
+    table: CsvTable, renamed: Mapping[str, str], time: str, second: float | None, drives: Mapping[str, float],
     read: frozenset[str],
 ) -> dict[str, Array]:  # fmt: skip
     """Return the columns of a file under the headers of a record; numbers are kept where the unit is.
 
-    drives: header of an input -> what its numbers are multiplied by. read: headers that the plant reads.
+    second: see `seconds_of`. drives: header of an input -> what its numbers are multiplied by. read: headers that the
+    plant reads.
     """
     for header in (time, *renamed):
         if header not in table.headers:
             raise ArmidError(f"{table.where}: no column {quoted(header)} is there, as in the first file: files of one "
                              "machine with the same columns are expected")  # fmt: skip
-        if header != time:
-            table.numbers(header, gaps=renamed[header] not in drives)
-    times = table.times(time) if second == 1.0 else np.round(table.times(time) * second, 12)
+    if (second is None) != (time in table.clocks):
+        kinds = ("times of day", "numbers") if second is not None else ("numbers", "times of day")
+        raise ArmidError(f"{table.where}: {quoted(time)} holds {kinds[0]}, {kinds[1]} are expected, as in the first "
+                         "file")  # fmt: skip
+    for header, new in renamed.items():
+        table.numbers(header, gaps=new not in drives)
+    times = table.times(time)
+    times = times if second in (None, 1.0) else np.round(times * second, 12)
     taken = {"time_s", *renamed.values()}
     # what is not used must not be taken for another input or output, as the counts of an encoder, which want its turn
     kept = {h: f"unused_{h}" if h in read or column_of(h).end in COUNT_ENDS else h for h in table.columns

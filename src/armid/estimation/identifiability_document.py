@@ -196,18 +196,19 @@ def result_of(examination: Examination) -> dict[str, Any]:
 
 def entries_of(examination: Examination) -> dict[str, dict[str, Any]]:
     information, x = examination.information, examination.x
-    columns = zip(examination.profiles, x, information.deviation, examination.wider, information.half_width,
-                  examination.at_bound, strict=True)  # fmt: skip
+    ends = [examination.space.of_one_sign(p.name, value - half, value + half)
+            for p, value, half in zip(examination.profiles, x, information.half_width, strict=True)]  # fmt: skip
+    columns = zip(examination.profiles, x, information.deviation, examination.wider, ends, examination.at_bound,
+                  strict=True)  # fmt: skip
     return {p.name: {
         "value": value, "unit": p.unit, "deviation": deviation, "deviation_with_tolerances": wider,
-        **dict(zip(("low", "high"), examination.space.of_one_sign(p.name, value - half, value + half), strict=True)),
-        "bound_low": p.box[0], "bound_high": p.box[1],
+        "low": low, "high": high, "bound_low": p.box[0], "bound_high": p.box[1],
         "bound_active": held,
         "profile": {
             "minimum": p.estimate, "low": p.low, "high": p.high, "bounded_low": p.bounded[0],
             "bounded_high": p.bounded[1], "agrees_with_curvature": p.agrees, "values": p.values, "rise": p.rise,
         },
-    } for p, value, deviation, wider, half, held in columns}  # fmt: skip
+    } for p, value, deviation, wider, (low, high), held in columns}  # fmt: skip
 
 
 def directions(fisher: Array, names: Sequence[str]) -> list[dict[str, Any]]:
