@@ -155,12 +155,14 @@ def test_times_of_day_are_seconds_after_the_first_row(begin, form, comma, steps)
         np.testing.assert_allclose(time_column(table), 1e-6 * after, rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("cells", [["12:00:01", "12:00:62 s"], ["12:00", "12:01"], ["2024-13-01 10:00:00"] * 2,
-                                   ["2024-05-01 10:00:00Z", "2024-05-01 10:00:01+02:00"]])  # fmt: skip
-def test_other_times_are_refused(tmp_path, cells):
+@pytest.mark.parametrize(("cells", "line"), [
+    (["12:00:01", "12:00:62 s"], 3), (["12:00", "12:01"], 2), (["2024-13-01 10:00:00"] * 2, 2),
+    (["2024-05-01 10:00:00Z", "2024-05-01 10:00:01+02:00"], 2),
+])  # fmt: skip
+def test_other_times_are_refused(tmp_path, cells, line):
     path = tmp_path / "a.csv"
     path.write_text("time_s,w\n" + "".join(f"{cell},1\n" for cell in cells))
-    with pytest.raises(ArmidError, match=r"time_s is '.*', a finite number is expected"):
+    with pytest.raises(ArmidError, match=rf"line {line}: time_s is '.*', a finite number is expected"):
         time_column(read_table(path, "a.csv"))
 
 
