@@ -212,7 +212,7 @@ def columns_of(cells: Cells) -> Iterator[tuple[str, Array | tuple[int, str]]]:
             continue
         filled = ["nan" if cell.lower() in NO_NUMBER else cell for cell in column]
         wrong = next((i for i, cell in enumerate(filled) if cell != "nan" and not CELL_NUMBER.fullmatch(cell)), None)
-        if wrong is not None and CLOCK.fullmatch(column[wrong]):  # of times of day the one that is none is wrong
+        if wrong is not None and CLOCK.fullmatch(column[wrong]):  # the fault is the cell that differs
             wrong = next((i for i, cell in enumerate(column) if not CLOCK.fullmatch(cell)), wrong)
         yield name, np.array(filled, dtype=np.float64) if wrong is None else (cells.lines[wrong], column[wrong])
 
