@@ -261,7 +261,7 @@ def parameter_figure(campaign: str, parameters: Mapping[str, Mapping[str, Any]],
             axis.axhline(factor * (truth[name] - value), color=OKABE_ITO["black"], lw=1.0, ls="--")
         axis.set_xticks([0, 1], ["before", "after"])
         axis.set(xlim=(-0.6, 1.6), ylabel="deviation [%]")
-        axis.set_title(f"{name}, {value_text(pair[1] | {'low': None})}", fontsize="small")
+        axis.set_title(f"{name}\n{value_text(pair[1] | {'low': None})}", fontsize="small")
     if not entries:
         axes[0].text(0.5, 0.5, "no parameter is free", ha="center", va="center")
         axes[0].set_axis_off()
