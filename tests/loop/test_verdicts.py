@@ -231,7 +231,7 @@ def test_parameters_are_drawn_in_percent_of_their_value_with_the_truth_where_it_
     before = {"p0": entry(2.5e6, 2.4e6, 2.6e6, trusted=False)}
     figure = parameter_figure("c", {"before": before, "after": after}, {"p0": 2.1e6})
     p0, sag = figure.axes
-    assert (p0.get_title(), sag.get_title()) == ("p0, 2 MPa", "sag, -4e-06 MPa")
+    assert (p0.get_title(), sag.get_title()) == ("p0\n2 MPa", "sag\n-4e-06 MPa")
     marks = [container.lines[0].get_ydata()[0] for container in p0.containers]
     assert marks == pytest.approx([25.0, 0.0])
     (bar,) = p0.containers[1].lines[2]
