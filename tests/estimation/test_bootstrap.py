@@ -60,7 +60,8 @@ def test_least_squares_scatters_as_the_cramer_rao_bound_says(stroke, arm_space, 
     monkeypatch.setattr(bootstraps, "MANY_DRAWS", 150)
     found = bootstrap(SQUARES, (stroke,), arm_space, x, information)
     assert len(found.draws) == 150
-    np.testing.assert_allclose([found.low, found.high], np.quantile(found.draws, (0.025, 0.975), axis=0))
+    ends = np.quantile(found.draws, (0.025, 0.975), axis=0) + found.moved * found.draws.std(axis=0, ddof=1)
+    np.testing.assert_allclose([found.low, found.high], ends)
     stopped = bootstrap(SQUARES, (stroke,), arm_space, x, information, 0, lambda _: True)
     assert stopped.doubt == "the bootstrap was interrupted"
 
@@ -77,6 +78,24 @@ def test_the_intervals_of_a_minimax_hold_the_truth_and_those_of_least_squares_do
     assert ((misses <= half).mean(axis=0) >= 0.85).all()
     assert (half < 1.3 * 1.96 * misses.std(axis=0) / np.sqrt(1.0 - 2.0 / np.pi)).all()
     assert ((misses <= information.half_width).mean(axis=0) < 0.6).all()
+
+
+def test_an_interval_lies_about_the_minimum_of_which_a_search_stopped_short(stroke, arm_space):
+    least = minimum(SQUARES, stroke, arm_space)
+    information = information_at((stroke,), arm_space, least)
+    short = bootstrap(SQUARES, (stroke,), arm_space, least + information.deviation * [0, 1, 0, 0], information)
+    assert not short.doubt
+    np.testing.assert_allclose((0.5 * (short.low + short.high) - least) / information.deviation, 0.0, atol=0.1)
+
+
+def test_where_the_minimum_is_a_plateau_the_estimates_scatter_over_it(stroke, arm_space):
+    """Where the largest deviation lies the speed may hang on all parameters but k."""
+    information = information_at((stroke,), arm_space, TRUTH)
+    task = Task(MINIMAX, (stroke,), arm_space, TRUTH, information)
+    noise = task.noises(np.random.default_rng(5), 12)
+    one, other = (refined(task, noise, np.random.default_rng(seed), lambda _: False).draws for seed in (1, 2))
+    apart = np.abs(one - other) / information.deviation
+    assert apart[:, 1].max() > 1.0
 
 
 def test_without_convergence_or_noise_and_where_nothing_is_determined_there_is_no_interval(

@@ -1,6 +1,6 @@
 """Intervals of an estimate that does not minimise a sum of squares: parametric bootstrap.
 
-Records are simulated at the estimate, noise as it was measured is added, and the same fitness is minimised again from
+Records are simulated at the estimate, noise as it was measured is added, and the same fitness is minimised again near
 the estimate: once for each draw of the noise. The scatter of the draws is that of the estimator.
 Source: Efron, Tibshirani 1993, chapter 6.
 All draws are refined side by side, each by a CMA-ES of its own (Hansen 2016, arXiv:1604.00772), so that one step of all
@@ -37,11 +37,10 @@ FIRST_DRAWS, MANY_DRAWS = 100, 400
 # Skewness above which a standard deviation says too little; of 100 normal draws it scatters by 0.24.
 SKEWED = 0.5
 # First step of a refinement, and the step at which it has converged, in standard deviations of the Cramer-Rao bound.
-FIRST_STEP, LAST_STEP = 2.0, 0.02
+# A minimax scatters by six of them.
+FIRST_STEP, LAST_STEP = 6.0, 0.02
 # Generations after which a draw does not converge, and the share of such draws that leaves no interval.
 MOST_GENERATIONS, MOST_LOST = 400, 0.05
-# The search has ended at the minimum when its refinement moves no parameter by more standard deviations than this.
-AT_MINIMUM = 0.5
 
 
 @dataclass
@@ -57,10 +56,11 @@ class Refined:
 class Scatter:
     """How the estimates of a bootstrap scatter.
 
-    draws: estimates that converged, SI, (n_draws, n_free). low, high: ends of the 95 % interval, SI, (n_free,): the
-    estimate +- 1.96 standard deviations, and the quantiles of the draws where these are skewed. bias: their mean less
-    the estimate, SI, (n_free,). moved: how far the estimate itself moves when it is refined, in standard deviations.
-    doubt: why there is no interval, "" where there is one. is_far: the estimate is not at the minimum of its fitness.
+    draws: estimates that converged, SI, (n_draws, n_free). low, high: ends of the 95 % interval, SI, (n_free,), about
+    the minimum that a refinement of the estimate finds, since a search stops short of it: that minimum +- 1.96 standard
+    deviations, and the quantiles of the draws where these are skewed. bias: mean of the draws less the estimate that
+    they were simulated at, SI, (n_free,). moved: how far the refinement moves the estimate, in standard deviations.
+    doubt: why there is no interval, "" where there is one. is_far: the estimate lies outside its interval.
     """
 
     draws: Array
@@ -183,7 +183,9 @@ class Task:
 
 def refined(task: Task, measured: Array, rng: np.random.Generator, progress: Callable[[Refined], bool]) -> Scatter:
     """Minimise the fitness for each draw from the estimate; the first of them is the measurement itself."""
-    searches, state = ParallelCmaes(len(measured), len(task.x)), Refined(len(measured) - 1)
+    # The minimum of some fitnesses is a plateau, on which a search ends anywhere: none starts at the estimate.
+    start = FIRST_STEP * rng.standard_normal((len(measured), len(task.x)))
+    searches, state = ParallelCmaes(start), Refined(len(measured) - 1)
     for _ in range(MOST_GENERATIONS):
         moving = searches.moving
         state.used = int(np.count_nonzero(~moving[1:]))
@@ -196,24 +198,25 @@ def refined(task: Task, measured: Array, rng: np.random.Generator, progress: Cal
     if not np.isfinite(searches.value).all() or lost[1:].mean() > MOST_LOST:
         n_lost = f"{lost[1:].sum()} of {state.budget}"
         return without(task.x, f"the fitness does not converge in {n_lost} draws of the noise")
-    x, kept = task.x, draws[1:][~lost[1:]]
+    x, minimum, kept = task.x, draws[0], draws[1:][~lost[1:]]
     deviation = np.std(kept, axis=0, ddof=1)
-    low, high = x - NORMAL_95 * deviation, x + NORMAL_95 * deviation
+    low, high = minimum - NORMAL_95 * deviation, minimum + NORMAL_95 * deviation
     skewed = np.abs(skew(kept)) > SKEWED
     if len(kept) > FIRST_DRAWS:
-        ends = np.quantile(kept, (0.025, 0.975), axis=0)
+        ends = np.quantile(kept, (0.025, 0.975), axis=0) + minimum - x
         low, high = np.where(skewed, ends[0], low), np.where(skewed, ends[1], high)
-    moved = (draws[0] - x) / np.maximum(deviation, 1e-300)
+    moved = (minimum - x) / np.maximum(deviation, 1e-300)
     scatter = Scatter(kept, low, high, kept.mean(axis=0) - x, moved)
-    if lost[0] or np.abs(moved).max() > AT_MINIMUM:
+    if lost[0] or np.any((x < low) | (x > high)):
         return replace(scatter, doubt=f"the search has not come to the minimum of {task.fitness.name}", is_far=True)
     return scatter
 
 
 class ParallelCmaes:
-    """A CMA-ES for each draw, all of them arrays over the draws; the start is 0, the unit a standard deviation."""
+    """A CMA-ES for each draw, all of them arrays over the draws, (n_draws, n); the unit is a standard deviation."""
 
-    def __init__(self, n_draws: int, n: int) -> None:
+    def __init__(self, start: Array) -> None:
+        n_draws, n = start.shape
         self.n, self.size = n, 4 + int(3 * np.log(n))
         parents = self.size // 2
         weights = np.log(parents + 0.5) - np.log(np.arange(1, parents + 1))
@@ -225,7 +228,7 @@ class ParallelCmaes:
         self.c_one = 2.0 / ((n + 1.3) ** 2 + mass)
         self.c_many = min(1.0 - self.c_one, 2.0 * (mass - 2.0 + 1.0 / mass) / ((n + 2.0) ** 2 + mass))
         self.expected = np.sqrt(n) * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n**2))
-        self.mean, self.best = np.zeros((n_draws, n)), np.zeros((n_draws, n))
+        self.mean, self.best = start.copy(), start.copy()
         self.value = np.full(n_draws, np.inf)
         self.sigma = np.full(n_draws, FIRST_STEP)
         self.covariance = np.tile(np.eye(n), (n_draws, 1, 1))
