@@ -26,6 +26,7 @@ def things(tmp_path, monkeypatch):
     (tmp_path / "empty").write_text("")
     (tmp_path / "binary").write_bytes(bytes(range(256)) * 4)
     (tmp_path / "folder").mkdir()
+    (tmp_path / "folder" / "report.json").write_text("{}")
     (tmp_path / "loop").symlink_to("loop")
     (tmp_path / "text.json").write_text('{"parameters": {"p0": {"value": "high"}}}')
     (tmp_path / "deep.json").write_text("[" * 100_000)

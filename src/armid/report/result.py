@@ -80,6 +80,8 @@ IDENTIFICATION = Kind("armid identify", "result.json", "report.html", "report.md
 IDENTIFIABILITY = Kind("armid identifiability", "identifiability.json", "identifiability.html", "identifiability.md",
                        "armid.estimation.identifiability_document", "identifiability_document", "")  # fmt: skip
 LOOP = Kind("armid close-loop", "report.json", "report.html", "report.md", "armid.loop.document", "loop_document")
+# File -> what makes it with a page report.html, which would take the place of the page of another.
+OWN_FOLDER = {IDENTIFICATION.file: IDENTIFICATION.command, LOOP.file: LOOP.command, "study.sqlite": "armid study"}
 
 
 class Shown:
@@ -235,7 +237,10 @@ class NewFiles:
 
 
 def refuse_unwritable(folder: Path | None, file: str = "") -> None:
-    """Refuse a folder before the work, not after it; file: the first that would come into it."""
+    """Refuse a folder before the work, not after it; file: the first that would come into it.
+
+    A folder that holds the result of another command is refused, too.
+    """
     if folder is not None:
         try:
             with NewFiles(folder):
@@ -244,6 +249,10 @@ def refuse_unwritable(folder: Path | None, file: str = "") -> None:
             where = folder / file if HIDDEN_PREFIX in str(error.filename) else error.filename or folder
             why = f"cannot be used: {error.strerror or error}, a folder that can be written is expected"
             raise ArmidError(f"{where} {why}") from error
+        others = OWN_FOLDER.keys() - {file} if file in OWN_FOLDER else set()
+        for other in sorted(name for name in others if (folder / name).is_file()):
+            raise ArmidError(f"{folder} holds {other}, which is of `{OWN_FOLDER[other]}`: a folder without one is "
+                             "expected, since report.html would be overwritten")
         if left < LEAST_ROOM:
             expected = f"at least {LEAST_ROOM / 1e6:.0f} MB are expected"
             raise ArmidError(f"{folder / file}: {left / 1e6:.1f} MB are left on its disk, {expected}")
