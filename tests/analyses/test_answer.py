@@ -72,7 +72,7 @@ def test_the_answer_to_table_2_is_how_repeats_agree_and_what_is_off():
     evidence = Evidence(replace(results, parameters=rows))
     said = answer_of(evidence, main_table(evidence))[0]
     assert re.match(r"Repeats on a record agree to [\d.e-]+ % with cmaes, to [\d.]+ % with pso \(0.3 deg/s", said)
-    why = "since the model lacks an effect of these records, or their truth is another"
+    why = "since the model lacks an effect of these records"
     assert said.endswith(f"off is eta3 by 10 %, {why}.")
 
 

@@ -42,7 +42,8 @@ MAP_CAPTION = (
 )
 VALLEY_CAPTION = (
     "Deviation (value - truth)/truth [%] of the results in each pair of parameters, one mark a run; counts on the "
-    "diagonal. Where marks lie along a line, parameters compensate each other."
+    "diagonal. Where marks lie along a line, parameters compensate each other. The axes are linear from -{linear:g} to "
+    "{linear:g} %, and logarithmic beyond."
 )
 
 
@@ -52,9 +53,14 @@ def error_parts(evidence: Evidence) -> Sequence[Part]:
     ends = end_points(evidence.estimates)
     if ends.shape[1] > 3 and len(ends) > 1:
         for s in (s for s in evidence.settings if (ends["setting"] == s).any()):
-            draw = partial(valley_figure, ends[ends["setting"] == s], evidence.colours)
-            name = slug("valley", s if len(evidence.settings) > 1 else "")
-            figures.append(Figure(name, f"Where runs end, {s}", VALLEY_CAPTION, draw))
+            own = ends[ends["setting"] == s]
+            linear = linear_range(own.drop(columns=["variant", "setting"]).to_numpy(float))
+            name, caption = (
+                slug("valley", s if len(evidence.settings) > 1 else ""),
+                VALLEY_CAPTION.format(linear=linear),
+            )
+            draw = partial(valley_figure, own, evidence.colours, linear)
+            figures.append(Figure(name, f"Where runs end, {s}", caption, draw))
     return figures
 
 
@@ -122,7 +128,7 @@ def end_points(estimates: DataFrame) -> DataFrame:
     return groups.join(wide[chosen].dropna(), how="inner")
 
 
-def valley_figure(ends: DataFrame, colours: Mapping[str, int]) -> Any:
+def valley_figure(ends: DataFrame, colours: Mapping[str, int], linear: float) -> Any:
     """Draw the deviations of each pair of parameters, one mark a run; those without a colour of their own are pale."""
     import seaborn as sns
 
@@ -137,9 +143,8 @@ def valley_figure(ends: DataFrame, colours: Mapping[str, int]) -> Any:
     with no_formulas():
         grid = sns.PairGrid(shown, vars=names, hue="shown", hue_order=hues, palette=palette, corner=True, height=2.9,
                             hue_kws={"marker": marks})  # fmt: skip
-        grid.map_lower(pyplot().plot, ls="", ms=5, mfc="none", mew=0.9)
+        grid.map_lower(pyplot().plot, ls="", ms=5, mfc="none", mew=0.9, clip_on=False)
         grid.map_diag(histogram)
-        linear = linear_range(shown[names].to_numpy(float))
         ticks = signed_powers(linear, float(np.abs(shown[names].to_numpy(float)).max()))
         for i, name in enumerate(names):
             for j, axis in enumerate(grid.axes[i, : i + 1]):

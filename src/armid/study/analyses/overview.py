@@ -224,7 +224,8 @@ def beside_paper(evidence: Evidence, frame: DataFrame) -> tuple[str, ...]:
     return (f"{words[bool(reproduced), bool(beaten)]} ({setting}): the paper's printed values are off by "
             f"{percent(paper)} (largest error of a run, median), its own swarm here ({swarm.name}) by "
             f"{percent(swarm['largest_median'])} with {swarm['used']:,.0f} simulations (half of its runs by "
-            f"{percent(quarter)} to {percent(three_quarters)}){cost}.",)  # fmt: skip
+            f"{percent(quarter)} to {percent(three_quarters)}, 95 % by at most {percent(swarm['largest_p95'])})"
+            f"{cost}.",)  # fmt: skip
 
 
 def repeats(evidence: Evidence, _: DataFrame) -> tuple[str, ...]:
@@ -240,7 +241,7 @@ def repeats(evidence: Evidence, _: DataFrame) -> tuple[str, ...]:
     own = runs[(runs["setting"] == setting) & (runs["variant"] == tight)].groupby("parameter", sort=False)["signed"]
     mean, scatter = own.mean(), own.std(ddof=0)
     off = [f"{name} by {percent(abs(mean[name]))}" for name in mean.index if abs(mean[name]) > OFF * scatter[name]]
-    why = "since the model lacks an effect of these records, or their truth is another"
+    why = "since the model lacks an effect of these records"
     lacks = f"; off is {listed(off)}, {why}" if off else ""
     worst = f", to {percent(searches.max())} with {wide}" if wide != tight else ""
     return (f"Repeats on a record agree to {percent(searches.min())} with {tight}{worst} ({setting}; standard "
