@@ -122,7 +122,7 @@ def test_a_search_of_the_user_has_options_and_follows_in_a_chain(axis, tmp_path)
     assert fine.used == 60
     with pytest.raises(ArmidError, match=r"no option 'stap'.*did you mean 'step'"):
         armid.identify(axis, identifier=annealing, options={"stap": 0.01}, **QUICK)
-    with pytest.raises(ArmidError, match=r"has no option 'lows', did you mean 'low'"):
+    with pytest.raises(ArmidError, match=r"has an argument 'lows' without a default.*did you mean 'low'"):
         armid.as_identifier("mine", lambda value, lows: None)
 
 

@@ -8,7 +8,7 @@ arguments that several of them take.
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import inf, isfinite
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -17,7 +17,7 @@ import numpy as np
 from armid.errors import ArmidError, DataError, ModelError, nearest, nearest_registered, quoted
 from armid.model import Array, Effect, Manoeuvre, Model, Plant, effect_name, effect_named, refusal_of
 from armid.model.effects.sensor import sensor_effects
-from armid.model.parameter import warn_if_far
+from armid.model.parameter import warn_if_far, warn_of_far
 from armid.progress import announced, search_bar, status_line
 from armid.record import Campaign, read_campaign
 from armid.record.campaign import campaign_of_tables, warned_once
@@ -82,7 +82,7 @@ def opened(
         model = read.model(registry.effects)
     for effect in each_of(effects):
         model = model + effect_of(effect, effects_known, read.plant)
-    warn_of_far(fix or {}, bounds or {}, model)
+    warn_of_far(model.parameters, fix or {}, bounds or {})
     return registry, read, model
 
 
@@ -148,15 +148,6 @@ def chosen(name: str, known: Mapping[str, object], what: str) -> Any:
     if name not in known:
         raise ModelError(f"{what} '{name}' is not known: {nearest_registered(str(name), known)}")
     return known[name]
-
-
-def warn_of_far(fixed: Mapping[str, float], bounds: Bounds, model: Model) -> None:
-    """Warn of fixed values and bounds far outside the declared range, as a forgotten factor gives."""
-    given = {name: ([v], f"fix {name} = {v:g}") for name, v in fixed.items() if isfinite(v)}
-    given |= {n: ([a, b], f"bounds {n} = {a:g} to {b:g}") for n, (a, b) in bounds.items() if -inf < a < b < inf}
-    for name, (values, text) in given.items():
-        if name in model.parameters:
-            warn_if_far(model.parameters[name], values, text)
 
 
 def identify(

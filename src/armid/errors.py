@@ -76,6 +76,8 @@ def on_a_line(sentence: str) -> str:
 
 # Longest list of valid words that a message shows in full [letters].
 LONGEST_LIST = 120
+# Words that a hint names which begin as what was written.
+MOST_BEGUN = 4
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
@@ -83,10 +85,15 @@ def nearest(word: str, known: Iterable[str]) -> str:
 
     >>> nearest("coulom", ["coulomb", "viscous"])
     "did you mean 'coulomb'?"
+    >>> nearest("noise", ["noise_deg_s", "noise_deg", "name"])
+    'did you mean one of noise_deg_s, noise_deg?'
     >>> nearest("friction", ["coulomb", "viscous"])
     'known: coulomb, viscous'
     """
     words = [str(k) for k in known]
+    begun = [w for w in words if w.startswith(f"{word}_") or w.startswith(f"{word}/")]
+    if word and len(begun) > 1:
+        return f"did you mean one of {', '.join(begun[:MOST_BEGUN])}?"
     close = get_close_matches(word, words, n=1, cutoff=0.6)
     if close:
         return f"did you mean '{close[0]}'?"

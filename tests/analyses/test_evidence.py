@@ -1,6 +1,7 @@
 """What analyses are given: names under which runs are compared, largest errors, first hits and values on a grid."""
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -9,9 +10,11 @@ from made_results import made
 from armid.study.analyses.analysis import (
     TARGETS,
     Evidence,
+    budget_texts,
     first_hits,
     held,
     histories,
+    ordered,
     outcomes,
     remaining_share,
     wide_runs,
@@ -28,6 +31,16 @@ def test_labels_and_settings_tell_what_differs():
     assert "0.3 deg/s, whole" in set(outcomes(two.runs, two.parameters, "rad/s")["setting"])
     own = outcomes(one.runs.assign(noise_deg_s=np.nan), one.parameters, "rad/s")
     assert set(own["setting"]) == {"as recorded"}
+
+
+def test_budgets_rise_and_one_that_another_key_cuts_says_so():
+    results = made(seeds=1, noises=(0.3,))
+    runs = pd.concat([results.runs.assign(budget=budget) for budget in (800, 40)])
+    results.study["cases"] = [case | {"bounds": dict.fromkeys("abcd")} for case in results.study["cases"]]
+    study = results.study | {"budget_per_parameter": [10, 1000]}
+    assert set(budget_texts(runs, study)) == {"10 D", "1000 D, at most 800"}
+    own = ordered(runs, study).groupby(["identifier", "case"])["budget"]
+    assert set(own.agg(tuple)) == {(40, 800)}
 
 
 def test_largest_error_is_of_known_truths_and_infinite_for_a_failed_run():

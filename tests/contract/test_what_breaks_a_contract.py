@@ -1,6 +1,7 @@
 """Each point of a contract is missed by something: here is what misses it."""
 
 import random
+import re
 from contextlib import suppress
 from dataclasses import replace
 from threading import Thread
@@ -13,6 +14,7 @@ from pymoo.algorithms.soo.nonconvex.pattern import PatternSearch
 
 from armid.contract.check import check_fitness, check_identifier
 from armid.contract.equations import check_effect, check_effects, check_plant
+from armid.errors import ArmidError
 from armid.identifiers import as_identifier
 from armid.model import PLANTS, Effect, Guard, Parameter, State
 from armid.problem.fitness import Fitness
@@ -200,3 +202,17 @@ def test_an_identifier_misses_points():
     assert set(failed(check_identifier(declared))) == {"seed"}
     missed = set(failed(check_identifier(as_identifier("pattern", lambda budget: PatternSearch()))))
     assert missed & {"reproducible", "survives failures", "survives NaN"}
+
+
+def test_a_search_of_a_user_that_leaves_the_box_or_asks_for_nothing_is_told_so():
+    def unit(value, low, high, random):
+        """Take the box for the unit cube."""
+        while True:
+            value(random.random((8, len(low))))
+
+    points = failed(check_identifier(as_identifier("unit", unit)))
+    assert re.match(r"'unit' asked for \d+ candidates outside `low` to `high`", points["inside the box"])
+    points = failed(check_identifier(as_identifier("never", lambda value: None)))
+    assert points == {"exact budget": "0 of 403 simulations used: it asked for no candidate"}
+    with pytest.raises(ArmidError, match=r"an array of shape \(3, 1\), one candidate \(3,\) or several"):
+        failed(check_identifier(as_identifier("column", lambda value, low: value(low[:, None]))))

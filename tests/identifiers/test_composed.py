@@ -1,6 +1,7 @@
 """Chains, multistart and CMA-ES with restarts: who gets how many simulations, and where each phase starts."""
 
 import random
+from typing import Annotated
 
 import numpy as np
 import pytest
@@ -10,13 +11,15 @@ from pymoo.algorithms.soo.nonconvex.nelder import NelderMead
 from pymoo.optimize import minimize
 from searches import Bowl, asked_of, identifier, ran
 
-from armid.identifiers import IDENTIFIERS, as_identifier, identifier_of
+from armid.errors import ArmidError
+from armid.identifiers import IDENTIFIERS, as_identifier, identifier_of, options_of
 from armid.identifiers.catalogue import spread
 from armid.problem.fitness import FITNESS
 from armid.problem.meter import Meter, MeterTermination
 from armid.problem.problem import IdentificationProblem, replays
 from armid.problem.space import space_of
 from armid.record import read_campaign
+from armid.study.tune import ranges_of
 
 OWN = IDENTIFIERS | {
     "mine": as_identifier("mine", NelderMead), "evolution": as_identifier("evolution", lambda budget: DE(pop_size=10)),
@@ -83,6 +86,38 @@ def test_a_user_s_own_takes_part(name):
     assert f.min() < f[:100].min()
     if name == "evolution+mine":
         np.testing.assert_allclose(asked[200], asked[np.argmin(f[:200])], rtol=1e-12)
+
+
+def stepping(value, low, high, random, step: Annotated[float, (0.05, 0.5), "first step"] = 0.2, restarts=3, way="up"):
+    """Step from the middle of the box.
+
+    And again.
+    """
+    value((low + high) / 2)
+    value(low + step * (high - low))
+
+
+def test_arguments_with_a_default_are_options_of_a_user_s_search():
+    own = as_identifier("stepping", stepping)
+    assert own.note == "Step from the middle of the box."
+    assert options_of(own) == {
+        "step": {"default": 0.2, "unit": "", "meaning": "first step"},
+        "restarts": {"default": 3, "unit": "", "meaning": ""}, "way": {"default": "up", "unit": "", "meaning": ""},
+    }  # fmt: skip
+    assert ranges_of(own) == {"step": (0.05, 0.5)}
+    problem = Bowl()
+    minimize(problem, own.with_options({"step": 1}).build(10), ("n_eval", 10), seed=1, copy_algorithm=False)
+    middle, corner = problem.unit(asked_of(problem)[0])
+    assert (set(middle), set(corner)) == ({0.5}, {1.0})
+    wrong = (({"step": "big"}, "step is 'big', expected a number as its default 0.2"),
+             ({"way": True}, "way is True, expected a text"), ({"stop": 1}, "did you mean 'step'"))  # fmt: skip
+    for given, said in wrong:
+        with pytest.raises(ArmidError, match=said):
+            own.with_options(given).build(10)
+    with pytest.raises(ArmidError, match="has an argument 'popsize' without a default, which an option needs: known"):
+        as_identifier("mine", lambda value, popsize: None)
+    with pytest.raises(ArmidError, match="an option cannot be called 'search'"):
+        as_identifier("mine", lambda value, search=1: None)
 
 
 def jumps(problem):

@@ -5,6 +5,7 @@ import pytest
 
 from armid.errors import ArmidError
 from armid.record import read_campaign
+from armid.record.record import RecordWarning
 from armid.record.start import Track, n_still, smoothed, state_at
 from input_texts import LOWERING
 
@@ -86,6 +87,8 @@ def test_a_caller_overrides_the_window_with_which_the_simulation_can_end(write):
     assert campaign.records[0].pieces[0].window == slice(500, 601)
     assert wide.records[0].pieces[0].window == slice(0, 701)
     assert wide.with_window(0.1, 0.2).records[0].pieces[0].window == slice(100, 201)
+    with pytest.warns(RecordWarning, match=r"window 0:700: the longest record ends at 1.201 s, a window in seconds"):
+        assert campaign.with_window(0.0, 700.0).records[0].pieces[0].window == slice(0, 1201)
     piece = wide.with_window(0.3, 0.7).records[0].pieces[0].until_window_end()
     assert piece.manoeuvre.n_samples == 701
     assert piece.window == slice(300, 701)

@@ -51,7 +51,7 @@ REFUSED = [
     ('name = "pso+least_squares"', 'name = "random"',
      "identifier 'random': the same run is asked for twice (fitness rmse, window 0-0.3 s), each once is expected"),
     ('name = "pso+least_squares"', 'name = "pso+least_squares"\nlabel = "random"',
-     "label 'random' names identifiers of other name or options"),
+     "two identifiers are called 'random'"),
     ('name = "small"', 'name = "../small"', "key 'name' is '../small', a plain name"),
     ('name = "small"', "name = ", "small.toml is not valid TOML"),
     ('[[cases]]\nname = "row 5"', 'campaign = "c"\n[[cases]]\nname = "row 5"',
@@ -71,6 +71,12 @@ def test_refused_with_one_sentence(write_study, tmp_path):
         with refusing(words, ".toml"):
             run_study(write_study(change=(old, new), more=BOX), out=tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+def test_bounds_in_another_unit_are_told(write_study):
+    told = pytest.warns(UserWarning, match="bounds p0 = 2.6 to 3.5 is far outside the declared range")
+    with told, pytest.raises(ArmidError, match="outside its bounds 2.6 to 3.5"):
+        read_study(write_study(more="[bounds]\np0 = [2.6, 3.5]\n"))
 
 
 @pytest.mark.parametrize(("told", "words"), [

@@ -11,6 +11,7 @@ import pytest
 
 from armid.errors import ArmidError
 from armid.estimation.identify import search
+from armid.identifiers import IDENTIFIERS
 from armid.problem.meter import Meter
 from armid.problem.problem import IdentificationProblem
 from armid.registry import load_registry
@@ -19,7 +20,7 @@ from armid.study.analyses.analysis import TARGETS, first_hits, remaining_share
 from armid.study.analyses.convergence import area_over_curve, attained
 from armid.study.store import Store
 from armid.study.tasks import read_study
-from armid.study.tune import RANGES, Tuned, proposed, training, tune, tuned_document, tuned_study
+from armid.study.tune import Tuned, proposed, ranges_of, training, tune, tuned_document, tuned_study
 from commands import ended
 
 STUDY = """\
@@ -76,6 +77,8 @@ def test_the_plan_has_each_problem_with_its_own_fitness_and_budgets_that_are_cut
     ({"[5, 30]": "[30, 5]"}, "budget_per_parameter"),
     ({"shell_transfer_arm": "driven_axis"}, "the suite brings its effects"),
     ({'name = "own"': 'name = "own"\nwindows_s = [[0.0, 0.3], "whole"]'}, "'windows_s' is given, but a problem"),
+    ({'name = "own"': 'name = "own"\nfitness = "rmse"'}, "'fitness' is given, but a problem"),
+    ({'name = "pso"': 'name = "pso"\nfitness = "rmse"'}, "'fitness' is given, but a problem"),
     ({'"cmaes"': '"least_squares"'}, "least_squares' needs residual vectors"),
 ])  # fmt: skip
 def test_what_cannot_be_is_refused(written, replaced, sentence):
@@ -187,8 +190,8 @@ def test_a_tuning_that_was_interrupted_ends_as_one_that_was_not(written, tmp_pat
 @pytest.mark.slow
 def test_a_configuration_that_fails_or_comes_again_ends_no_tuning(written, tmp_path, monkeypatch):
     pytest.importorskip("optuna")
-    monkeypatch.setitem(RANGES, "pso", {"n_particles": (8, 8)})
-    monkeypatch.setitem(RANGES, "cmaes", {"no_such": (1.0, 2.0)})
+    ranges = {"pso": {"n_particles": (8, 8)}, "cmaes": {"no_such": (1.0, 2.0)}}
+    monkeypatch.setattr("armid.study.tune.ranges_of", lambda identifier: ranges.get(identifier.name, {}))
     first = training(read_study(written(**SMALL)), 1)
     (swarm, cmaes), ending = tune(first, "own.toml", tmp_path / "out", 3, jobs=1)
     assert ending.counts == (2 * (2 + 3), 6, 4)
@@ -201,13 +204,14 @@ def test_a_configuration_that_fails_or_comes_again_ends_no_tuning(written, tmp_p
 def test_proposals_follow_from_scores_and_seed_and_go_where_the_area_is():
     pytest.importorskip("optuna")
     known = [({"initial_step": float(x)}, -abs(np.log(x / 0.1))) for x in np.geomspace(0.005, 0.5, 30)]
-    found = [proposed("bobyqa", known, (1, i))["initial_step"] for i in range(8)]
-    assert found == [proposed("bobyqa", known, (1, i))["initial_step"] for i in range(8)]
-    assert len({*found, proposed("bobyqa", known, (2, 0))["initial_step"]}) == 9
+    steps, swarm = (ranges_of(IDENTIFIERS[name]) for name in ("bobyqa", "pso"))
+    found = [proposed(steps, known, (1, i))["initial_step"] for i in range(8)]
+    assert found == [proposed(steps, known, (1, i))["initial_step"] for i in range(8)]
+    assert len({*found, proposed(steps, known, (2, 0))["initial_step"]}) == 9
     assert 0.07 < np.median(found) < 0.14
-    first = proposed("pso", [], (1, 1))
-    assert list(first) == list(RANGES["pso"])
-    assert all(low <= first[name] <= high for name, (low, high) in RANGES["pso"].items())
+    first = proposed(swarm, [], (1, 1))
+    assert list(first) == list(swarm)
+    assert all(low <= first[name] <= high for name, (low, high) in swarm.items())
     assert isinstance(first["n_particles"], int)
 
 
@@ -252,7 +256,7 @@ def test_the_answer_of_a_tuning(written):
 
 
 def test_tuning_takes_the_largest_budget_and_each_identifier_once_and_what_it_refuses(written):
-    study = read_study(written('fitness = "rmse"', **{'name = "cmaes"': 'name = "pso"\nfitness = "similarity"'}))
+    study = read_study(written(**{'name = "cmaes"': 'name = "pso"\nlabel = "again"'}))
     first = training(study, 7)
     assert first.labels == ["pso"]
     assert first.case_names == ["arm 3", "arm_shape 3", "arm_short 3"]

@@ -41,8 +41,8 @@ def complete_name(context: click.Context, parameter: click.Parameter, incomplete
 def list_command(what: str, names: tuple[str, ...], is_long: bool, plugins: tuple[str, ...]) -> None:
     """List what is registered: names and what they are; of each NAME the parameters, units, ports and source.
 
-    --long adds equations, and of identifiers the name, default, unit and meaning of each option. analyses: sections of
-    the report of a study.
+    --long shows that of all, and adds equations. Of an identifier it is the name, default, unit and meaning of each
+    option. analyses: sections of the report of a study.
     """
     refuse_unless_known(what, KINDS, f"list '{what}' is not known")
     registry = load_registry(plugins)
@@ -86,7 +86,8 @@ def note_of(thing: Any) -> str:
 
 
 def kinds_of(identifier: Any) -> str:
-    kinds = {"gradient": identifier.uses_gradient, "stochastic": identifier.is_stochastic,
+    seed = "stochastic" if identifier.is_global else "random start"
+    kinds = {"gradient": identifier.uses_gradient, seed: identifier.is_stochastic,
              "rmse or likelihood": identifier.needs_residuals}  # fmt: skip
     return ", ".join(["global" if identifier.is_global else "local", *(word for word, on in kinds.items() if on)])
 

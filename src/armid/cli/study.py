@@ -107,7 +107,7 @@ def tune_command(
     study: Path, configurations: int, seed: int, jobs: int | None, dask: str | None, out: Path | None,
     plugins: tuple[str, ...],
 ) -> None:  # fmt: skip
-    """Write STUDY again with each identifier twice, as it is and tuned.
+    """Write STUDY again with each identifier as it is and, where that is better, tuned.
 
     Every identifier gets the same number of configurations, its defaults among them, judged by the area over the
     convergence curve on the instances that [suite] calls train; the study itself is run on others. Finished runs are

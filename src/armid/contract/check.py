@@ -1,6 +1,7 @@
 """The entrance to all contracts; those of a campaign, of a fitness and of an identifier."""
 
 import threading
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
@@ -14,7 +15,7 @@ from armid.errors import ArmidError
 from armid.estimation.corrections import DataIssue
 from armid.estimation.data_checks import data_issues, roomy_space
 from armid.identifiers import Identifier, as_identifier
-from armid.identifiers.own import global_generators
+from armid.identifiers.own import OutsideWarning, global_generators
 from armid.model import PLANTS, Array, Effect, Model, Plant
 from armid.problem.fitness import Fitness, as_fitness
 from armid.problem.meter import BudgetIgnoredError, Meter, Metered, MeterTermination
@@ -173,6 +174,7 @@ class Trial(Metered):
 
     10 (b - a^2)^2 + (a - 0.3)^2 + (c - 0.8)^2 in the unit cube; the failures are where a > 0.8. bare: they come out as
     NaN instead of the penalty that armid's problems give. watch: called with the candidates before they are evaluated.
+    outside: candidates outside the box. moved: the warning about those that were moved into it before, "" without any.
     """
 
     def __init__(
@@ -181,7 +183,7 @@ class Trial(Metered):
         low, high = np.array([2.0e6, 0.5, -1.0]), np.array([3.0e6, 1.5, 1.0])
         super().__init__(meter, n_var=3, n_obj=1, xl=low, xu=high)
         self.holes, self.bare, self.watch = holes, bare, watch
-        self.outside = 0
+        self.outside, self.moved = 0, ""
 
     def evaluated(self, X: Array, residuals: bool) -> tuple[Array, Array | None]:
         """Return the height of the valley, (n_candidates,), and the three terms whose squares it sums."""
@@ -213,12 +215,16 @@ def check_identifier(identifier: Identifier) -> Iterator[ContractPoint]:
     except BudgetIgnoredError as error:
         yield ContractPoint("exact budget", False, str(error))
         return
+    if not meter.used:
+        yield ContractPoint("exact budget", False, f"0 of {TRIAL_BUDGET} simulations used: it asked for no candidate")
+        return
     log = meter.log()
     best = f"the best of the log is {np.min(log.F):.3g}, the best that is kept {meter.best_f:.3g}"
     yield ContractPoint(
         "exact budget", 0 < meter.used <= TRIAL_BUDGET, f"{meter.used} of {TRIAL_BUDGET} simulations used"
     )
-    yield ContractPoint("inside the box", problem.outside == 0, f"{problem.outside} candidates outside the bounds")
+    text = problem.moved or f"{problem.outside} candidates outside the bounds"
+    yield ContractPoint("inside the box", problem.outside == 0 and not problem.moved, text)
     yield ContractPoint("best never lost", meter.best_f == float(np.min(log.F)), best)
     early = float(np.median(log.F[:20]))
     yield ContractPoint("improves", meter.best_f < early, f"from {early:.3g}, the median of its first 20, to "
@@ -270,7 +276,8 @@ def raising(identifier: Identifier) -> ContractPoint:
         came = type(error).__name__
     ended_before = came == "nothing" and seen <= RAISES_AT
     left = [t.name for t in threading.enumerate() if t not in before]
-    text = f"a problem that raises BrokenError: {came} came out, {len(left)} threads are left"
+    came_out = "the search ended before" if ended_before else f"{came} came out"
+    text = f"a problem that raises BrokenError: {came_out}, {len(left)} threads are left"
     return ContractPoint("errors come out", (came == BrokenError.__name__ or ended_before) and not left, text)
 
 
@@ -278,8 +285,14 @@ def run(identifier: Identifier, seed: int, problem: Trial | None = None, noise: 
     """Run an identifier on a trial problem; noise: state of the global generators, which must not matter."""
     trial = Trial(Meter(TRIAL_BUDGET)) if problem is None else problem
     assert trial.meter is not None
-    with global_generators(noise):
+    with global_generators(noise), warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always", OutsideWarning)
         minimize(trial, identifier.build(TRIAL_BUDGET), MeterTermination(trial.meter), seed=seed, copy_algorithm=False)
+    for warning in told:
+        if warning.category is OutsideWarning:
+            trial.moved = str(warning.message)
+        else:
+            warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
     return trial.meter, trial
 
 

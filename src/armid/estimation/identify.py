@@ -301,9 +301,9 @@ def identified(
     if space.free.any():
         stopped = search(IdentificationProblem(space, train, fitness, meter), meter, identifier, seed, progress)
         if meter.best_x is None:
-            raise ArmidError(
-                f"none of {meter.used} candidates has a fitness: each diverged, or the fitness was no finite number"
-            )
+            why = "each diverged, or the fitness was no finite number"
+            none = f"identifier '{identifier.name}' asked for no candidate, at least one is expected"
+            raise ArmidError(f"none of {meter.used} candidates has a fitness: {why}" if meter.used else none)
         # what rounding alone keeps off a bound is held by it
         low, high = space.low[space.free], space.high[space.free]
         left = np.flatnonzero(np.maximum(low - meter.best_x, meter.best_x - high) > OUT_OF_BOX * (high - low))

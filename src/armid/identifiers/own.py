@@ -6,23 +6,28 @@ import threading
 import warnings
 from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, make_dataclass
 from functools import partial
-from typing import Any
+from types import NoneType
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pymoo.core.algorithm import Algorithm
 
-from armid.errors import ArmidError
-from armid.identifiers.identifier import Identifier, accepts, declared, option, refuse_unknown
-from armid.identifiers.search import Asker, Calls, SearchAlgorithm, SearchOptions, SearchTask, seed_from
+from armid.errors import ArmidError, nearest
+from armid.identifiers.identifier import Identifier, accepts, declared, option, options_in
+from armid.identifiers.search import Asker, Calls, SearchOptions, SearchTask, seed_from
 from armid.model import Array
 from armid.problem.meter import PENALTY
 
 SEARCH_ARGUMENTS = ("value", "low", "high", "budget", "random", "start")
+# Kinds of options of a function, in words; true is a number, too, so that it comes first.
+OPTION_KINDS: dict[Any, str] = {bool: "true or false", int | float | np.number: "a number", str: "a text"}
+# Share of the box by which a candidate may lie outside by rounding.
+ROUNDING = 1e-9
 
 
 def as_identifier(name: str, obj: Any) -> Identifier:
@@ -38,7 +43,8 @@ def as_identifier(name: str, obj: Any) -> Identifier:
         function of a candidate, (n_parameters,), that returns a number, or of several at once, (n_candidates,
         n_parameters), that returns (n_candidates,). It may name `low` and `high`, the bounds, and `start`, the best so
         far in a chain, else a random point of the box, SI, each (n_parameters,); `budget`, the simulations after which
-        it is ended; `random`, numpy's Generator. Arguments with a default are options.
+        it is ended; `random`, numpy's Generator. Further arguments are options: their default is a number, a text, true
+        or false, or None; `Annotated[float, (0.05, 0.5), "first step"]` gives the range of `armid tune` and a meaning.
 
     Returns
     -------
@@ -58,7 +64,7 @@ def as_identifier(name: str, obj: Any) -> Identifier:
         return obj
     expected = (
         "expected a subclass of pymoo's Algorithm, a function of the budget that returns one, or a function that "
-        "searches by itself, whose first argument is `value`"
+        "searches by itself, whose first argument is `value`; a fitness is a function of (measured, simulated)"
     )
     if isinstance(obj, Algorithm) and obj.problem is None:
         return Identifier(name, lambda budget: deepcopy(obj), "an algorithm of the user")
@@ -68,9 +74,11 @@ def as_identifier(name: str, obj: Any) -> Identifier:
         return Identifier(name, lambda budget: obj(), "a class of the user")
     if callable(obj) and not isinstance(obj, type) and "value" in arguments_of(obj):
         needed = [argument for argument, p in arguments_of(obj).items() if p.default is p.empty]
-        refuse_unknown(needed, SEARCH_ARGUMENTS, f"what is given to a search such as '{name}'")
-        return Identifier(name, partial(searching, name, obj), "a search of the user",
-                          is_global="start" not in arguments_of(obj))  # fmt: skip
+        for argument in set(needed) - set(SEARCH_ARGUMENTS):
+            raise ArmidError(f"identifier '{name}' has an argument '{argument}' without a default, which an option "
+                             f"needs: {nearest(argument, SEARCH_ARGUMENTS)}")  # fmt: skip
+        note = (inspect.getdoc(obj) or "a search of the user").partition("\n")[0]
+        return declared(name, note, own_search(name, obj), is_global="start" not in arguments_of(obj))
     if callable(obj) and not isinstance(obj, type) and accepts(obj, 1):
         return Identifier(name, partial(built, name, obj), "a function of the user")
     raise ArmidError(f"identifier '{name}' is {obj!r}, {expected}")
@@ -84,22 +92,62 @@ def built(name: str, factory: Callable[[int], Algorithm], budget: int) -> Algori
 
 
 def arguments_of(function: Callable[..., Any]) -> dict[str, inspect.Parameter]:
-    try:
-        return dict(inspect.signature(function).parameters)
-    except (TypeError, ValueError):
-        return {}
+    # annotations may be texts of names that stand nowhere
+    for read in (True, False):
+        with suppress(TypeError, ValueError, NameError):
+            return dict(inspect.signature(function, eval_str=read).parameters)
+    return {}
 
 
-def searching(name: str, function: Callable[..., Any], budget: int, **options: Any) -> SearchAlgorithm:
-    """Return a user's search as an algorithm; refuse with ArmidError an option that it does not take."""
-    refuse_unknown(options, [a for a in arguments_of(function) if a not in SEARCH_ARGUMENTS], f"'{name}'")
-    return SearchAlgorithm(partial(search_by, function, options), budget)
+@dataclass(frozen=True)
+class OwnSearch(SearchOptions):
+    """Options of a function that searches; a value is of the kind of its default."""
+
+    function: ClassVar[Callable[..., Any]]
+
+    def __post_init__(self) -> None:
+        for name, default in ((each.name, each.default) for each in options_in(type(self))):
+            value = getattr(self, name)
+            wanted, found = (next((words for kind, words in OPTION_KINDS.items() if isinstance(v, kind)), "")
+                             for v in (default, value))  # fmt: skip
+            if wanted and found != wanted:
+                raise ArmidError(f"{name} is {value!r}, expected {wanted} as its default {default!r}")
+
+    def search(self, task: SearchTask) -> None:
+        """Call the function, and warn where it has left the box."""
+        given = {each.name: getattr(self, each.name) for each in options_in(type(self))}
+        value = Value(task.ask, task.problem.xl, task.problem.xu)
+        try:
+            search_by(type(self).function, given, task, value)
+        finally:
+            if value.n_outside:
+                warnings.warn(f"'{type(self).__name__}' asked for {value.n_outside} candidates outside `low` to "
+                              "`high`, each was moved into that box", OutsideWarning, stacklevel=2)  # fmt: skip
 
 
-def search_by(function: Callable[..., Any], options: Mapping[str, Any], task: SearchTask) -> None:
+class OutsideWarning(UserWarning):
+    """Say that a search has asked for candidates outside the box."""
+
+
+def own_search(name: str, function: Callable[..., Any]) -> type[OwnSearch]:
+    """Return the options of a function as a dataclass: its arguments with a default, and what annotations say."""
+    made = []
+    for argument in arguments_of(function).values():
+        if argument.name not in SEARCH_ARGUMENTS and isinstance(argument.default, (*OPTION_KINDS, NoneType)):
+            if hasattr(OwnSearch, argument.name):
+                raise ArmidError(f"identifier '{name}': an option cannot be called '{argument.name}', another name is "
+                                 "expected")  # fmt: skip
+            told = getattr(argument.annotation, "__metadata__", ())
+            ends = next((ends for ends in told if isinstance(ends, tuple) and len(ends) == 2), None)
+            meaning = next((text for text in told if isinstance(text, str)), "")
+            made.append((argument.name, Any, option(argument.default, meaning, "", tune=ends)))
+    namespace = {"function": staticmethod(function)}
+    return make_dataclass(name, made, bases=(OwnSearch,), namespace=namespace, frozen=True)
+
+
+def search_by(function: Callable[..., Any], options: Mapping[str, Any], task: SearchTask, value: "Value") -> None:
     """Let a function search that calls for values until they raise."""
     low, high, cube = task.problem.xl, task.problem.xu, task.cube
-    value = Value(task.ask, low, high)
     start = cube.candidates(cube.first(task))[0] if task.start is None else task.start
     given = {"value": value, "low": low.copy(), "high": high.copy(), "budget": task.budget, "random": task.random,
              "start": start.copy()}  # fmt: skip
@@ -108,11 +156,25 @@ def search_by(function: Callable[..., Any], options: Mapping[str, Any], task: Se
 
 
 class Value:
-    """Answer what a search asks; what failed gets a value above all that was seen, as few libraries take infinity."""
+    """Answer what a search asks; what failed gets a value above all that was seen, as few libraries take infinity.
+
+    n_outside: candidates that were outside the box by more than rounding, and were moved into it.
+    """
 
     def __init__(self, ask: Asker, low: Array, high: Array) -> None:
-        self.ask = Calls(lambda x: ask(np.clip(np.atleast_2d(x), low, high)).F)
+        self.low, self.high, self.n_outside = low, high, 0
+        self.ask = Calls(lambda x: ask(self.inside(x)).F)
         self.least, self.most = np.inf, -np.inf
+
+    def inside(self, x: Array) -> Array:
+        if x.shape[-1:] != self.low.shape or x.ndim > 2:
+            n = len(self.low)
+            raise ArmidError(f"`value` was given an array of shape {x.shape}, one candidate ({n},) or several "
+                             f"(n_candidates, {n}) are expected")  # fmt: skip
+        X = np.atleast_2d(x)
+        rounding = ROUNDING * (self.high - self.low)
+        self.n_outside += int(((self.low - rounding > X) | (self.high + rounding < X)).any(axis=1).sum())
+        return np.clip(X, self.low, self.high)
 
     def __call__(self, x: ArrayLike) -> float | Array:
         asked = np.asarray(x, dtype=np.float64)
@@ -129,7 +191,7 @@ class Foreign(SearchOptions):
 
     def search(self, task: SearchTask) -> None:
         """Minimise until the task drops it."""
-        search_by(self.minimise, {}, task)
+        search_by(self.minimise, {}, task, Value(task.ask, task.problem.xl, task.problem.xu))
 
     @abstractmethod
     def minimise(self, value: Value, low: Array, high: Array, budget: int, random: np.random.Generator) -> None:

@@ -4,7 +4,7 @@ import keyword
 import math
 import re
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from numbers import Real
 from typing import Any
@@ -73,6 +73,18 @@ def warn_if_far(parameter: Parameter, values: Sequence[float], where: str) -> No
         warnings.warn(f"{where} is negative, outside {declared}", stacklevel=3)
     elif all(abs(v) > FAR_OUT * max(abs(low), abs(high)) or (low > 0.0 and FAR_OUT * v < low) for v in values):
         warnings.warn(f"{where} is far outside {declared}", stacklevel=3)
+
+
+def warn_of_far(
+    parameters: Mapping[str, Parameter], fixed: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]
+) -> None:
+    """Warn of fixed values and bounds far outside the declared range, as a forgotten factor gives."""
+    given = {name: ([v], f"fix {name} = {v:g}") for name, v in fixed.items() if math.isfinite(v)}
+    finite = {n: pair for n, pair in bounds.items() if all(map(math.isfinite, pair)) and pair[0] < pair[1]}
+    given |= {n: (list(pair), f"bounds {n} = {pair[0]:g} to {pair[1]:g}") for n, pair in finite.items()}
+    for name, (values, text) in given.items():
+        if name in parameters:
+            warn_if_far(parameters[name], values, text)
 
 
 SCALE_WORDS = ("effort", "speed", "inertia", "s", "1")

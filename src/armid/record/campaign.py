@@ -125,10 +125,15 @@ class Campaign(Shown):
     def with_window(self, begin: float, end: float) -> "Campaign":
         """Return the campaign with one window [s] for every record, whatever its file says; both ends count.
 
-        Raises DataError for a window that is empty, runs backward, or holds fewer than 20 samples of a record.
+        Raises DataError for a window that is empty, runs backward, or holds fewer than 20 samples of a record. Warns
+        where it ends after all records, as milliseconds do.
         """
-        records = (with_window(r, (begin, end), f"window {begin:g}:{end:g}") for r in self.records)
-        return replace(self, records=tuple(records))
+        records = tuple(with_window(r, (begin, end), f"window {begin:g}:{end:g}") for r in self.records)
+        last = max((r.manoeuvre.start_time + r.manoeuvre.interval * r.measured.size for r in self.records), default=end)
+        if end > last:
+            warnings.warn(f"window {begin:g}:{end:g}: the longest record ends at {last:.4g} s, a window in seconds is "
+                          "expected", RecordWarning, stacklevel=2)  # fmt: skip
+        return replace(self, records=records)
 
 
 @caused_by(DataError)

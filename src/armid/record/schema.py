@@ -201,6 +201,8 @@ def json_schema(
 
 # Bytes of a file: tables that are nested 8 deep take 350 times as much memory.
 LARGEST_TOML = 2_000_000
+# Tables that may stand several times in a file.
+TABLES = ("records", "cases", "identifiers")
 # The parser takes memory with the square of the parts of a dotted key, which stands on one line: so large is the sum of
 # the squared numbers of dots over all lines at most. A list of 3,000 names of files on one line stays below it.
 MOST_SQUARED_DOTS = 10_000_000
@@ -381,8 +383,9 @@ def load_toml(path: Path, named: str = "") -> dict[str, Any]:
 
 def advice_on(error: str, content: bytes) -> str:
     """Return what to do about a frequent fault of TOML, with a colon before it, "" for others."""
-    if "('records',) twice" in error:
-        return ": each record begins with [[records]]"
+    twice = re.search(r"\('(\w+)',\) twice", error)
+    if twice and twice[1] in TABLES:
+        return f": each of several begins with [[{twice[1]}]]"
     at = re.search(r"Invalid value \(at line (\d+)", error)
     line = content.decode().split("\n")[int(at[1]) - 1] if at else ""
     bare = re.fullmatch(r"\s*([\w.-]+)\s*=\s*([A-Za-z_][\w.-]*)\s*(#.*)?", line)

@@ -251,8 +251,10 @@ def refuse_unwritable(folder: Path | None, file: str = "") -> None:
             raise ArmidError(f"{where} {why}") from error
         others = OWN_FOLDER.keys() - {file} if file in OWN_FOLDER else set()
         for other in sorted(name for name in others if (folder / name).is_file()):
-            raise ArmidError(f"{folder} holds {other}, which is of `{OWN_FOLDER[other]}`: a folder without one is "
-                             "expected, since report.html would be overwritten")
+            raise ArmidError(
+                f"{folder} holds {other}, which is of `{OWN_FOLDER[other]}`: a folder without one is "
+                "expected, since report.html would be overwritten"
+            )
         if left < LEAST_ROOM:
             expected = f"at least {LEAST_ROOM / 1e6:.0f} MB are expected"
             raise ArmidError(f"{folder / file}: {left / 1e6:.1f} MB are left on its disk, {expected}")

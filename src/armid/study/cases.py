@@ -15,6 +15,7 @@ from armid.engine import FINE, Schedule, calibrate, simulate
 from armid.errors import ArmidError, located, quoted
 from armid.estimation.least_squares import with_fitted_starts
 from armid.model import Manoeuvre, Model, Plant, effect_name
+from armid.model.parameter import warn_of_far
 from armid.problem.problem import Replay, replays
 from armid.problem.space import Space, space_of
 from armid.problem.suite import DEFINITIONS, N_INSTANCES, VERSION, SuiteProblem, suite
@@ -29,7 +30,7 @@ from armid.units import DEG, SUFFIXES
 
 MOST_SIMULATED = 10**7
 # What a problem of the suite brings, so that no key of a study may tell it.
-BROUGHT = ("noise_deg_s", "windows_s", "interval_s", "accuracy", "constants", "bounds", "fixed")
+BROUGHT = ("noise_deg_s", "windows_s", "interval_s", "accuracy", "constants", "bounds", "fixed", "fitness")
 # Steps at the truth are finer by this factor than those of the engine at its "fine" accuracy. The error falls with the
 # fourth power: of the arm it is then about 1e-11 rad/s.
 FINER_TRUTH = 8
@@ -93,6 +94,7 @@ def suite_cases(spec: StudySpec, where: str, train: bool = False) -> list[Case]:
     if spec.plant != "shell_transfer_arm" or spec.effects:
         raise ArmidError(f"{where}: the suite brings its effects, plant 'shell_transfer_arm' without any is expected")
     given = [f.name for f in fields(spec) if f.name in BROUGHT and getattr(spec, f.name) not in (f.default, {})]
+    given += ["fitness"] if any("fitness" in table for table in spec.identifiers) else []
     if given and not spec.cases and spec.random_cases is None:
         raise ArmidError(f"{where}: '{given[0]}' is given, but a problem of the suite brings its own, no such key is "
                          "expected")  # fmt: skip
@@ -135,6 +137,7 @@ def _space(
     fixed = {name: v for name, v in spec.fixed.items() if name not in entry.bounds} | dict(entry.fixed)
     bounds = {name: b for name, b in spec.bounds.items() if name not in entry.fixed} | dict(entry.bounds)
     with located(where):
+        warn_of_far(model.parameters, fixed, bounds)
         return space_of(model, overrides, bounds, fixed)
 
 

@@ -363,8 +363,8 @@ def _entries(spec: StudySpec, unit: str, registry: StudyRegistry, where: str) ->
         entries.append(entry)
     for one, two in combinations(entries, 2):
         if one.label == two.label and (one.name, one.options) != (two.name, two.options):
-            raise ArmidError(f"{where}: label '{one.label}' names identifiers of other name or options, "
-                             "a label of its own is expected for each")  # fmt: skip
+            raise ArmidError(f"{where}: two identifiers are called '{one.label}' and have other options, a key 'label' "
+                             "with a text of its own is expected in one of them")  # fmt: skip
     return tuple(entries)
 
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from armid.errors import ArmidError
-from armid.identifiers import IDENTIFIERS
+from armid.identifiers import IDENTIFIERS, Identifier
 from armid.identifiers.identifier import options_in
 from armid.report.document import Column, Document, listed, table
 from armid.study.analyses.analysis import TARGETS, first_hits, remaining_share
@@ -28,10 +28,11 @@ from armid.study.spec import EntrySpec
 from armid.study.store import DONE
 from armid.study.tasks import Study
 
-# Identifier -> option -> range: whole numbers where both ends are; in the logarithm where they are 10 times apart.
-RANGES = {name: ranges for name, identifier in IDENTIFIERS.items() if (ranges := {
-    option.name: ends for option in options_in(identifier.algorithm) if (ends := option.metadata["option"].tune)
-})}  # fmt: skip
+
+def ranges_of(identifier: Identifier) -> dict[str, tuple[float, float]]:
+    """Return option -> range: whole numbers where both ends are; in the logarithm where they are 10 times apart."""
+    options = options_in(identifier.algorithm) if identifier.algorithm else []
+    return {option.name: ends for option in options if (ends := option.metadata["option"].tune)}
 
 
 @dataclass(frozen=True)
@@ -66,7 +67,7 @@ def tune(
         for entry in first.entries:
             own = tried[entry.label]
             known = [(trial.options, areas[trial.label]) for trial in own[1:]]
-            options = proposed(entry.name, known, (entry.seeds[0], i)) if i else {}
+            options = proposed(ranges_in(first, entry), known, (entry.seeds[0], i)) if i else {}
             # the same once more would tell nothing new
             if all(trial.options != options for trial in own):
                 own.append(replace(entry, label=f"{entry.label} {i}", options=options))
@@ -101,8 +102,9 @@ def training(study: Study, seed: int) -> Study:
     entries = [replace(e, seeds=(seed,), budget_per_parameter=e.budget_per_parameter[-1:], budget=e.budget[-1:])
                for e in tunable(study)]  # fmt: skip
     if not entries:
-        raise ArmidError(f"study '{study.name}' has nothing to tune, one of {', '.join(RANGES)} without options is "
-                         "expected")  # fmt: skip
+        known = ", ".join(name for name, identifier in IDENTIFIERS.items() if ranges_of(identifier))
+        raise ArmidError(f"study '{study.name}' has nothing to tune, one of {known} without options is expected, or a "
+                         'function of your own with a range, step: Annotated[float, (0.05, 0.5)] = 0.2')  # fmt: skip
     spec = replace(study.spec, name=f"{study.name}_training", question="Which options are best on the train instances?")
     return replace(study, spec=spec, cases=tuple(cases), entries=tuple(entries))
 
@@ -114,18 +116,24 @@ def tunable(study: Study) -> list[EntrySpec]:
         same = any(
             e.label == entry.label or (e.name, e.largest_budget) == (entry.name, entry.largest_budget) for e in entries
         )
-        if entry.name in RANGES and not entry.options and not same:
+        if ranges_in(study, entry) and not entry.options and not same:
             entries.append(entry)
     return entries
 
 
-def proposed(name: str, known: Iterable[tuple[Mapping[str, Any], float]], seed: Sequence[int]) -> dict[str, Any]:
-    """Return the next configuration of an identifier; the same scores and seed propose the same."""
+def ranges_in(study: Study, entry: EntrySpec) -> dict[str, tuple[float, float]]:
+    return ranges_of(study.registry.identifier(entry.name, f"study '{study.name}'"))
+
+
+def proposed(
+    wanted: Mapping[str, tuple[float, float]], known: Iterable[tuple[Mapping[str, Any], float]], seed: Sequence[int]
+) -> dict[str, Any]:  # fmt: skip
+    """Return the next configuration for ranges of options; the same scores and seed propose the same."""
     import optuna
 
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     kinds: dict[type, Any] = {int: optuna.distributions.IntDistribution, float: optuna.distributions.FloatDistribution}
-    ranges = {option: kinds[type(low)](low, high, log=high >= 10 * low) for option, (low, high) in RANGES[name].items()}
+    ranges = {option: kinds[type(low)](low, high, log=high >= 10 * low) for option, (low, high) in wanted.items()}
     sampler = optuna.samplers.TPESampler(seed=int(np.random.SeedSequence(seed).generate_state(1)[0]))
     trials = optuna.create_study(direction="maximize", sampler=sampler)
     for options, area in known:

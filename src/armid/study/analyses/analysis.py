@@ -349,10 +349,12 @@ def outcomes(runs: DataFrame, parameters: DataFrame, unit: str) -> DataFrame:
 
 def budget_texts(runs: DataFrame, study: dict[str, Any]) -> list[str]:
     """Return the budget of each run in simulations a free parameter; one that was cut counts as the next larger."""
-    n_free = {case["name"]: len(case["bounds"]) for case in study["cases"]}
+    n_free = runs["case"].map({case["name"]: len(case["bounds"]) for case in study["cases"]})
     known = study["budget_per_parameter"]
-    return [f"{next((m for m in known if m * n_free[c] >= b), known[-1])} D"
-            for c, b in zip(runs["case"], runs["budget"], strict=True)]  # fmt: skip
+    factors = [next((m for m in known if m * n >= b), known[-1]) for n, b in zip(n_free, runs["budget"], strict=True)]
+    cut = (runs["budget"] < n_free * factors).to_numpy()
+    most = {m: f", at most {b:,}" for m, b, is_cut in zip(factors, runs["budget"], cut, strict=True) if is_cut}
+    return [f"{factor} D{most.get(factor, '')}" for factor in factors]
 
 
 def noise_text(level: float, unit: str) -> str:
@@ -367,7 +369,7 @@ def ordered(runs: DataFrame, study: dict[str, Any]) -> DataFrame:
     label = {str(name): i for i, name in enumerate(study["identifiers"])}
     case = {str(c["name"]): i for i, c in enumerate(study["cases"])}
     keys = runs.assign(_label=runs["identifier"].map(label), _case=runs["case"].map(case))
-    by = ["_label", "identifier", "fitness", "_case", "case", "noise_deg_s", "window", "seed", "run"]
+    by = ["_label", "identifier", "fitness", "_case", "case", "noise_deg_s", "window", "budget", "seed", "run"]
     return keys.sort_values(by, kind="stable", ignore_index=True).drop(columns=["_label", "_case"])
 
 

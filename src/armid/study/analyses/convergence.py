@@ -26,10 +26,12 @@ SUCCESS_CAPTION = (
 # Of both targets.
 CAPTION = (
     "ERT = (simulations of all runs until the target is first hit, or all that were used) / (number of runs that hit "
-    "it), over all cases and seeds; in brackets the share of runs that hit. {target} A run may leave a target again, "
-    "so that hits can exceed the success rates, which judge the end."
+    "it), over all cases and seeds; in brackets the share of runs that hit. {target}"
 )
-TARGET = "Target: the largest relative error of the best candidate so far is at the tolerance or below."
+TARGET = (
+    "Target: the largest relative error of the best candidate so far is at the tolerance or below. A run may leave a "
+    "target again, so that hits can exceed the success rates, which judge the end."
+)
 ECDF_CAPTION = (
     "Share of all pairs of a run and a target that are hit within so many simulations. The 51 targets are largest "
     "relative errors of the parameters, from 100 % to 1e-8 %."
@@ -135,7 +137,7 @@ BEST_TARGET = (
     "Target: no more than this share is left of the way from a first candidate (median over all runs on the case) to "
     "the best fitness that anyone found on the same case, noise and seed."
 )
-WATERFALL_CAPTION = "What a run leaves of the way to the best fitness, sorted. A flat step is a local minimum."
+WATERFALL_CAPTION = "What a run leaves of the way to the best fitness, sorted. Runs that end alike make a step."
 
 
 BEST_FITNESS = Analysis("best_fitness", "Cost of the best fitness", lambda evidence: (

@@ -40,7 +40,8 @@ TABLE1_FIGURE_CAPTION = (
 )
 LAYOUT_CAPTION = (
     "True value, identified value and relative error of each parameter. The paper's values are of its arm (Table I "
-    "simulated, Table II measured), ours of our simulated arm: medians over the seeds. 0.000 is an error below 0.0005 %."
+    "simulated, Table II measured), ours of our simulated arm: medians over the seeds. 0.000 is an error below "
+    "0.0005 %."
 )
 DEVIATION_CAPTION = " deviation: standard deviation of the population."
 PRINTED_PARTS = {"truth": "true", "value": "found", "relative_error": "error"}
@@ -225,8 +226,8 @@ TABLE2_CAPTION = (
     "mean and standard deviation (of the population, the paper's mean square error): over all runs. between records: "
     "of the means of the records, which their noise makes; within a record: among repeats on it, which the search "
     "makes. Cramer-Rao: median of the bound for one record, widened where the model leaves more than noise. at a "
-    "bound: runs that ended on the box, which then decides the value. The paper's lines are its five identifications of a real arm, ours are synthetic: the two "
-    "need not agree."
+    "bound: runs that ended on the box, which then decides the value. The paper's lines are its five "
+    "identifications of a real arm, ours are synthetic: the two need not agree."
 )
 TABLE2_FIGURE_CAPTION = (
     "Result of each run, one mark a record; the paper's identifications above as diamonds. The line is the truth of "

@@ -16,6 +16,7 @@ from armid.problem.suite import DEFINITIONS
 from armid.report.document import Column, Figure, Part, Table, Text, listed, slug
 from armid.report.style import INK, line_look, pyplot
 from armid.study.analyses.analysis import BUDGET_COLUMN, VARIANT, Analysis, Evidence, is_swarm
+from armid.study.store import ON
 
 # Errors of 1e-6 % and below are all as good as exact: what is left is rounding.
 ARRIVED_ERROR = 1e-8
@@ -144,8 +145,9 @@ def arrived(evidence: Evidence, setting: str) -> Series:
 
 
 def arrived_text(reached: Series) -> str:
-    return (f"{(reached > HALF).sum()} of the {len(reached)} identifiers that share a fitness arrive at its lowest "
-            "value in most runs")  # fmt: skip
+    what = "pairs of identifier and fitness" if any(ON in variant for variant in reached.index) else "identifiers"
+    return (f"{(reached > HALF).sum()} of the {len(reached)} {what} that share a fitness arrive at its lowest value in "
+            "most runs")  # fmt: skip
 
 
 def blocks_of(runs: DataFrame, quantity: str) -> DataFrame:
