@@ -92,6 +92,13 @@ def test_a_study_that_was_cut_off_after_its_first_case_has_an_answer_and_ranks_n
     assert "arrive" not in text.text
 
 
+def test_a_plug_in_whose_runs_fail_is_named_with_its_first_error():
+    results = made(seeds=2, failed=3, identifiers={"exact": 0.0, "mine": 0.1})
+    evidence = Evidence(replace(results, study=results.study | {"plugins": ["folder/mine.py:mine"]}))
+    yours = answer_of(evidence, main_table(evidence))[-1]
+    assert yours.endswith("; 3 of 20 runs failed, the first of mine: it broke in the middle.")
+
+
 def test_the_report_of_a_suite_says_who_cannot_be_told_from_the_best_and_where_the_own_stands():
     landscape = dict.fromkeys(("n_records", "noise_deg_s", "valley", "stair", "plateau", "minima", "holes"), 1.0)
     cases = [{**PAPER_CASES[i % 5], "name": f"p{i}", "suite": f"p{i}", "difficulty": "valley", "floor": 0.0,

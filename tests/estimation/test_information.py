@@ -143,6 +143,7 @@ def test_at_the_minimum_the_step_is_small_and_away_from_it_is_large(lowering_rep
     best = estimate(lowering_replays, arm_space)
     at_best = information_at(lowering_replays, arm_space, best)
     assert np.abs(at_best.step).max() < 0.2
+    assert 0.0 <= at_best.gain < 0.01
     # where a bound holds one parameter, those that go with it have come as far as they can
     narrow = arm_space.with_bounds("eta3", 0.45, 0.545)
     held = estimate(lowering_replays, narrow)
@@ -150,6 +151,10 @@ def test_at_the_minimum_the_step_is_small_and_away_from_it_is_large(lowering_rep
     assert np.abs(information_at(lowering_replays, narrow, held).step).max() < 0.2
     away = best + 8.0 * np.array([0.0, 1.0, 0.0, 0.0]) * at_best.deviation
     assert information_at(lowering_replays, arm_space, away).step[1] == pytest.approx(-8.0, rel=0.2)
+    # where a search stops far off, what is left is smooth and widens the deviations, so that the step looks small
+    far = information_at(lowering_replays, arm_space, best + 200.0 * np.array([0.0, 1.0, 0.0, 0.0]) * at_best.deviation)
+    assert far.levels[0].from_residual
+    assert far.gain > 0.9
 
 
 @pytest.fixture(scope="module")

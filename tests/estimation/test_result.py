@@ -95,16 +95,17 @@ def test_noise_a_lacking_model_an_unfinished_search_and_a_failed_holdout_are_tol
     quiet = noisy(lowering_found.train_replays[0], source="differences", mean=None, rms=1e-4)
     lacking = {"train_replays": (quiet,), "information": replace(information, levels=(level,))}
     away, near = (
-        {"information": replace(information, step=np.array([0.1, k, 0.2, np.nan])), "scatter": None}
+        {"information": replace(information, step=np.array([0.1, k, 0.2, np.nan]), gain=0.0), "scatter": None}
         for k in (-40.0, 1.0)
     )
+    short = {"information": replace(information, gain=0.93), "scatter": None}
     train = replace(lowering_found.train, chi2_per_sample=1.1)
     worse, alike = ({"train": train, "holdout": replace(train, chi2_per_sample=chi2)} for chi2 in (6.6, 1.2))
     for changes, words, is_told in (
         (lacking, "from high-frequency differences of the motion: no rest with still inputs has 50 samples", True),
         (lacking, "this many times the noise: 300 in lower.csv: the model lacks something", True),
         (away, "has not come to the least-squares minimum", True), (away, "move k by 40", True),
-        (near, "least-squares minimum", False),
+        (near, "least-squares minimum", False), (short, "take away 93 % of the squares", True),
         (worse, "does not carry over", True), (alike, "does not carry over", False),
     ):  # fmt: skip
         assert (words in "\n".join(details_of(replace(lowering_found, **changes))["remarks"])) == is_told, words

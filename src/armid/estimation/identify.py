@@ -58,6 +58,8 @@ WAS_INTERRUPTED = "interrupted"
 APART_IN_DEVIATIONS = 5.0
 # A least-squares step of more standard deviations than this: a search by another fitness ends within a few.
 FAR_FROM_MINIMUM = 4.0
+# Share of the squares that such a step would take away, where what is left tells of the search and not of the model.
+MOST_GAIN = 0.5
 # An estimate that is biased by more standard deviations has an interval that misses the truth in more than 8 %.
 BIASED = 0.5
 # Why there is no interval.
@@ -234,10 +236,11 @@ class Identification(Result):
 
     @property
     def is_far_from_minimum(self) -> bool:
-        """Whether a step from the estimate would move some parameter by many standard deviations."""
+        """Whether a step from the estimate would move some parameter far, or take away most of what is left."""
         if self.scatter is not None:
             return self.scatter.is_far
-        return bool(np.nan_to_num(np.abs(self.information.step)).max(initial=0.0) > FAR_FROM_MINIMUM)
+        moved = np.nan_to_num(np.abs(self.information.step)).max(initial=0.0)
+        return bool(moved > FAR_FROM_MINIMUM or self.information.gain > MOST_GAIN)
 
     @property
     def table(self) -> "DataFrame":

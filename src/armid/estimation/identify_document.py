@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from armid.engine.calibrate import NOISE_HIDES
-from armid.estimation.identify import Identification, errors_by_file, versions_of
+from armid.estimation.identify import MOST_GAIN, Identification, errors_by_file, versions_of
 from armid.estimation.information import Information, collinear
 from armid.model import Array
 from armid.problem.fitness import SIMILARITIES
@@ -308,9 +308,11 @@ def convergence_remarks(identification: Identification) -> list[str]:
         of, better = "least-squares minimum", "Identifier least_squares on fitness rmse, a"
         if identification.scatter is not None:
             of, better = f"minimum of {identification.fitness.name}", "A"
+        gain = identification.information.gain
+        falls = f" and take away {100.0 * gain:.0f} % of the squares" if gain > MOST_GAIN else ""
         texts.append(f"The search has not come to the {of}: a step from here would move {name} by {steps.max():.3g} of "
-                    f"its standard deviations, so the intervals do not hold. {better} larger budget or another seed "
-                    "may get there.")  # fmt: skip
+                    f"its standard deviations{falls}, so the intervals do not hold. {better} larger budget or another "
+                    "seed may get there.")  # fmt: skip
     train, unseen = identification.train.chi2_per_sample, identification.holdout
     holdout = None if unseen is None else unseen.chi2_per_sample
     if unseen is None or train is None or holdout is None:

@@ -30,7 +30,8 @@ class Information:
     deviation: standard deviation of each, SI, (n_free,), infinite where the records do not determine it. correlation:
     of the estimates, (n_free, n_free), NaN where not determined. step: how far a least-squares step inside the box
     would move each parameter, in standard deviations: far above 1 where a search has not come to the minimum. fisher:
-    information matrix of the parameters in shares of their range, weighed with 1 where a record has no noise.
+    information matrix of the parameters in shares of their range, weighed with 1 where a record has no noise. gain:
+    share of the weighted squares that this step would take away, were the model linear.
     """
 
     names: tuple[str, ...]
@@ -39,6 +40,7 @@ class Information:
     levels: tuple[Level, ...]
     step: Array
     fisher: Array
+    gain: float = 0.0
 
     @property
     def half_width(self) -> Array:
@@ -91,7 +93,7 @@ def information_at(
     if not noise_free:
         return information
     shown = np.where(np.isfinite(information.deviation), 0.0, information.deviation)
-    return replace(information, deviation=shown, step=np.zeros(len(x)))
+    return replace(information, deviation=shown, step=np.zeros(len(x)), gain=0.0)
 
 
 def information_of(
@@ -131,7 +133,10 @@ def information_of(
         correlation = covariance / np.outer(deviation, deviation)
         steps = step / deviation
     correlation[~np.isfinite(correlation)] = np.nan
-    return Information(records.space.free_names, deviation * records.span, correlation, (), steps, total)
+    squares = float(residual @ residual)
+    left = residual - jacobian @ step
+    gain = 1.0 - float(left @ left) / squares if squares > 0.0 else 0.0
+    return Information(records.space.free_names, deviation * records.span, correlation, (), steps, total, gain)
 
 
 def sensitivities(replay: Replay, space: Space, x: Array) -> Array:

@@ -302,6 +302,11 @@ def own(evidence: Evidence, frame: DataFrame) -> tuple[str, ...]:
         texts += [f"{v} is number {1 + int((order < order[v]).sum())} of {len(order)} ({setting}, "
                  f"{percent(medians[v])})" for v in mine[:MOST_OWN]]  # fmt: skip
         texts += [f"{len(mine) - MOST_OWN} more in the table ({setting})"] if len(mine) > MOST_OWN else []
+    runs = evidence.runs[evidence.runs["variant"].isin(evidence.own)]
+    lost = runs[runs["status"] != "done"]
+    if len(lost):
+        error = " ".join(str(lost["error"].iloc[0]).split()).rstrip(".")
+        texts.append(f"{len(lost)} of {len(runs)} runs failed, the first of {lost['variant'].iloc[0]}: {error}")
     return (f"Your own: {'; '.join(texts)}.",) if texts else ()
 
 
