@@ -11,6 +11,7 @@ import pytest
 from armid.errors import ArmidError
 from armid.estimation.examine import collinearity_index, examine, groups
 from armid.estimation.identifiability_document import (
+    answer_and_remarks,
     draw_profile,
     interval_text,
     offer_text,
@@ -97,6 +98,18 @@ def test_a_point_that_is_given_and_a_holdout_that_has_no_say(lowering, arm, arm_
     garbage = holdout.with_measured({holdout.output: -7.0 * holdout.measured})
     again = examine(replace(lowering, records=(train, garbage)), arm, arm_space)
     assert json.dumps(result_of(again)) == json.dumps(result_of(one_stroke))
+
+
+def test_what_the_records_hold_beyond_noise_leads_the_answer(one_stroke):
+    level = one_stroke.information.levels[0]
+    more = replace(level, rms=6.0 * one_stroke.replays[0].record.noise.rms, from_residual=True)
+    information = replace(one_stroke.information, levels=(more,))
+    lacking = replace(one_stroke, information=information, wider=2.0 * information.deviation)
+    answer, _ = answer_and_remarks(result_of(lacking))
+    assert answer[0].startswith("The model lacks something or a constant is off: the residual is 6 times the noise in ")
+    assert answer[1].startswith("Bounded on both sides, with the standard deviation: p0 (")
+    assert answer[1].count(" with the tolerances") == 4
+    assert not any("lacks something" in text for text in answer_and_remarks(result_of(one_stroke))[0])
 
 
 @pytest.mark.parametrize(("told", "said"), [

@@ -77,7 +77,7 @@ def identifiability_document(
 
 
 def answer_and_remarks(result: Mapping[str, Any]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return which parameters are bounded, which move together and the best offer; and the other remarks."""
+    """Return what is more than noise, what is bounded, what moves together, the best offer; and the other remarks."""
     bounded, by_others, unbounded = list[str](), list[str](), list[str]()
     for name, p in result["parameters"].items():
         deviation = deviation_text(name, p, p["deviation"])
@@ -86,13 +86,16 @@ def answer_and_remarks(result: Mapping[str, Any]) -> tuple[tuple[str, ...], tupl
         elif deviation == UNDETERMINED:
             by_others.append(name)
         else:
-            bounded.append(f"{name} ({deviation})")
+            wider = p.get("deviation_with_tolerances", p["deviation"])
+            counted = f", {deviation_text(name, p, wider)} with the tolerances" if wider > p["deviation"] else ""
+            bounded.append(f"{name} ({deviation}{counted})")
+    misfit = (result["misfit"],) if result.get("misfit") else ()
     texts = [f"Bounded on both sides, with the standard deviation: {', '.join(bounded)}."] if bounded else []
     texts += [f"Bounded by the limits of other parameters alone: {', '.join(by_others)}."] if by_others else []
     texts += [f"Not bounded on both sides: {', '.join(unbounded)}."] if unbounded else []
     n = len(result["groups"])
     *others, best = result["remarks"][n:]
-    return (" ".join(texts) or "No parameter is free.", *result["remarks"][:n], best), tuple(others)
+    return (*misfit, " ".join(texts) or "No parameter is free.", *result["remarks"][:n], best), tuple(others)
 
 
 def parameter_table(result: Mapping[str, Any]) -> Table:
@@ -190,6 +193,7 @@ def result_of(examination: Examination) -> dict[str, Any]:
         ],
         "remarks": remarks(examination),
         "for_the_record": level_remarks(examination),
+        "misfit": misfit_remark(examination),
         "versions": versions_of(PACKAGES_OF_IDENTIFIABILITY),
     })  # fmt: skip
 
@@ -296,6 +300,21 @@ def level_remarks(examination: Examination) -> list[str]:
     return said[:MOST_GROUPS_SHOWN] + ([f"So it is with {left} more."] if left > 0 else [])
 
 
+def misfit_remark(examination: Examination) -> str:
+    """Return which records hold more than noise, and what that does to the intervals, "" for none."""
+    pairs = zip(examination.replays, examination.information.levels, strict=True)
+    times = {r.name: level.rms / r.record.noise.rms if r.record.noise.rms else np.inf
+             for r, level in pairs if level.from_residual}  # fmt: skip
+    if not times:
+        return ""
+    low, high = (f"{end(times.values()):.2g}" for end in (min, max))
+    span = low if low == high else f"{low} to {high}"
+    many = f" and {len(times) - MOST_GROUPS_SHOWN} more" if len(times) > MOST_GROUPS_SHOWN else ""
+    return (f"The model lacks something or a constant is off: the residual is {span} times the noise in "
+            f"{listed(list(times)[:MOST_GROUPS_SHOWN])}{many}. The intervals are widened to the residual and its "
+            "correlation in time, and hold only as far as what is lacking averages out.")  # fmt: skip
+
+
 def level_text(level: Level, unit: str, noise: float) -> str:
     value, name = shown(level.rms, unit)
     if level.assumed:
@@ -303,9 +322,7 @@ def level_text(level: Level, unit: str, noise: float) -> str:
                 "groups do not depend on it.")  # fmt: skip
     if level.from_residual:
         times = level.rms / noise if noise else np.inf
-        return (f"the residual of {value:.2g} {name} is {times:.2g} times the noise: the model lacks something or "
-                "a constant is off. The intervals are widened to the residual and its correlation in time, and hold "
-                "only as far as what is lacking averages out.")  # fmt: skip
+        return f"the residual of {value:.2g} {name} is {times:.2g} times the noise."
     share = level.effective_fraction
     coloured = "" if share > 0.9 else f", coloured: one sample in {1 / share:.2g} is new"
     return f"noise {value:.2g} {name} rms{coloured}."
