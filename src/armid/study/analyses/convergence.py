@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pandas import DataFrame, concat
 
+from armid.problem.fitness import SIMILARITIES
 from armid.report.document import Column, Figure, Part, Table, slug
 from armid.report.style import LEAST_HEIGHT, named_lines, panels
 from armid.study.analyses.analysis import BUDGET_COLUMN, N_RUNS, SETTING, TARGETS, VARIANT, Analysis, Evidence
@@ -178,10 +179,11 @@ def convergence_parts(evidence: Evidence) -> Sequence[Part]:
     for name in names:
         own = (evidence.runs["fitness"] == name).to_numpy()
         unit, factor = evidence.scale_of_fitness(name)
-        label = f"best fitness ({name}{unit})"
+        told = f"1 - {name}" if name.partition(":")[0] in SIMILARITIES else name
+        label = f"best fitness ({told}{unit})"
         draw = partial(convergence_figure, evidence, own, factor * kept.values, label, LEAST_FITNESS)
         file = slug("convergence", name) if len(names) > 1 else "convergence_fitness"
-        figures.append(Figure(file, f"Convergence of {name}", FITNESS_CAPTION.format(fitness=name), draw))
+        figures.append(Figure(file, f"Convergence of {name}", FITNESS_CAPTION.format(fitness=told), draw))
     return figures
 
 
