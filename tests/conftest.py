@@ -38,11 +38,12 @@ NOT_TRACED = (
 )  # fmt: skip
 # Slow tests of these folders, files and tests are nightly: programs next to the package, and many machines one by one.
 NIGHTLY = (
-    "studies", "test_data_checks.py", "test_data_checks_outputs.py", "test_declared_outputs.py", "test_delays.py",
-    "test_fast_motion.py", "test_input_noise.py", "test_loop_run.py", "test_many_records.py", "test_oracles.py",
-    "test_outputs_loop.py", "test_pendulum_in_motion.py", "test_record_faults.py", "test_strangers.py",
-    "test_identifiers_that_misbehave_fail_alone", "test_the_advised_record_tells_apart_and_beats_a_random_one",
-    "test_the_small_blind_suite", "test_values_at_stored_points_of_other_machines",
+    "studies", "test_data_checks_outputs.py", "test_declared_outputs.py", "test_fast_motion.py", "test_input_noise.py",
+    "test_loop_run.py", "test_many_records.py", "test_oracles.py", "test_outputs_loop.py", "test_pendulum_in_motion.py",
+    "test_record_faults.py", "test_strangers.py", "test_a_late_control_moves_the_arm_as_on_the_test_stand",
+    "test_identifiers_that_misbehave_fail_alone", "test_right_campaigns_are_not_accused",
+    "test_the_advised_record_tells_apart_and_beats_a_random_one", "test_the_small_blind_suite",
+    "test_values_at_stored_points_of_other_machines",
 )  # fmt: skip
 # Those that take longest come first, so that two processes end together.
 LONGEST = (

@@ -157,7 +157,7 @@ def test_a_name_is_shown_as_it_is_by_every_renderer(name, capsys, monkeypatch):
 def test_names_in_figures_that_another_library_lays_out(name):
     errors = DataFrame([[0.1, 0.2], [0.3, np.inf]], index=[name, "b"], columns=[name, "d"])
     ends = DataFrame({"variant": [name, "b"] * 4, "setting": "s", "p": np.arange(8.0), "q": np.arange(8.0) ** 2})
-    for figure in (error_map_figure({name: errors}), valley_figure(ends, {name: 0, "b": 1})):
+    for figure in (error_map_figure({name: errors}), valley_figure(ends, {name: 0, "b": 1}, 1.0)):
         assert name in "".join(Elements(svg_text(figure)).texts)
 
 
