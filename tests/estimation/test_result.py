@@ -126,6 +126,8 @@ def test_a_residual_of_little_more_than_noise_is_told(stand, tmp_path, key, noti
     details = details_of(found) | {"within_tolerances": ["R (0.03)"]}
     said = "\n".join(answer(result_of(found), details))
     assert " (constants count as exact): " in said
+    many = "\n".join(answer(result_of(found), details | {"within_tolerances": [f"I{i} (0.02)" for i in range(28)]}))
+    assert "known roughly: I0 (0.02), I1 (0.02), I2 (0.02), I3 (0.02), I4 (0.02), I5 (0.02) and 22 more." in many
     assert "no record was held out, so that nothing judges the model" in said
     assert ("do not rely on the 95 % intervals" in said) is noticed
 

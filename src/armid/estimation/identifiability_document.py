@@ -106,7 +106,7 @@ def parameter_table(result: Mapping[str, Any]) -> Table:
         profile = p["profile"]
         bounded = {(True, True): "", (True, False): "not above", (False, True): "not below"}.get(
             (profile["bounded_low"], profile["bounded_high"]), "NOT BOUNDED")  # fmt: skip
-        flag = "AT ITS BOUND" if p["bound_active"] else "" if profile["agrees_with_curvature"] else "THEY DIFFER"
+        flag = "AT ITS BOUND" if p["bound_active"] else "" if profile["agrees_with_curvature"] else "CURVATURE DIFFERS"
         rows.append((name, factor * p["value"], unit, profile_text(profile, factor),
                      ", ".join(word for word in (flag, bounded) if word),
                      deviation_text(name, p, p["deviation"]), curved))  # fmt: skip

@@ -60,6 +60,8 @@ PAIRS = (
 # Figures that a page takes as they are stored: name -> title and caption.
 FIGURES = {"convergence": ("The search", "Best so far against the number of simulations."), "pairs": PAIRS}
 MOST_KNOWN_FIRST = 3
+# Constants within tolerances that a sentence names.
+MOST_TOLD = 6
 # A mean square on held-out records of more times that on the fitted ones than this.
 CARRIES_OVER = 1.5
 # Of more records than this one sentence tells.
@@ -119,7 +121,8 @@ def identify_document(
 
 def answer(result: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, ...]:
     free = {name: p for name, p in result["parameters"].items() if p["bound_low"] is not None}
-    exact = ", ".join(details.get("within_tolerances", ()))
+    known = list(details.get("within_tolerances", ()))
+    exact = ", ".join(known[:MOST_TOLD]) + (f" and {len(known) - MOST_TOLD} more" if len(known) > MOST_TOLD else "")
     begins = lead(free, result["error"]["holdout"] is not None)
     begins += " (constants count as exact)" if exact and any(p["low"] is not None for p in free.values()) else ""
     lost = [name for name, p in free.items() if p["low"] is None and p.get("interval_by") != "bootstrap"]
