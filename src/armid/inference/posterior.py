@@ -316,7 +316,9 @@ def confirmed_slopes(fit: Fit, columns: Array, flat: Array, weight: float) -> Ar
 
     Slopes are differences, and those of a motion with sharp friction hold the engine's rounding. Where parameters and
     constants make up for each other exactly (inertia, friction and resistance of a motor), that rounding alone would
-    tell them apart, and an interval would not hold. So the unknowns are moved along each axis of their posterior.
+    tell them apart, and an interval would not hold. So the unknowns are moved along each axis of their posterior. Steps
+    that are longer than a deviation, or slopes that a fit has carried on, err where unknowns nearly make up for each
+    other: along an axis that the records show the slopes are those between both ends of the move.
     columns: whitened slopes by the free parameters, the further unknowns of the fit, and what it holds, (n_samples, n).
     flat: prior precision of each, (n,). weight: of each square, see `evidence.Scale`.
     """
@@ -330,17 +332,29 @@ def confirmed_slopes(fit: Fit, columns: Array, flat: Array, weight: float) -> Ar
     held = np.append(held_by_bound(fit.records.space, fit.x), np.zeros(n - n_free, dtype=np.bool_))
     moving = np.flatnonzero(~held)
     counted = np.append(moving, np.arange(n, columns.shape[1]))
-    for _ in range(MOST_LOOKS if moving.size else 0):
+
+    def residuals(rows: Array) -> Array:
+        return np.asarray(root * residuals_at(base, unknowns, rows[:, n_free:], rows[:, :n_free]))
+
+    def axes_and_room(columns: Array) -> tuple[Array, Array]:
         axes = np.zeros((n, moving.size))
         axes[moving] = principal_axes(columns[:, counted], flat[counted], weight, moving.size)
-        moves = DEVIATIONS * axes
-        shares = room(here[:n_free], moves[:n_free])
-        moves = shares * moves
+        return axes, room(here[:n_free], DEVIATIONS * axes[:n_free])
+
+    if moving.size:
+        axes, shares = axes_and_room(columns)
+        moves = DEVIATIONS * shares * axes
+        below, above = np.split(residuals(np.concatenate([here - moves.T, here + moves.T])) / root, 2)
+        along = columns[:, :n] @ axes
+        chords = (below - above).T / np.maximum(2.0 * DEVIATIONS * shares, 1e-300)
+        shown = weight * np.sum(along**2, axis=0) * (shares == 1.0) > BELIEVED
+        shown &= np.isfinite(chords).all(axis=0)
+        columns = columns.copy()
+        columns[:, moving] = np.where(shown, chords, along) @ np.linalg.inv(axes[moving])
+    for _ in range(MOST_LOOKS if moving.size else 0):
+        axes, shares = axes_and_room(columns)
+        moves = DEVIATIONS * shares * axes
         along, foretold = root * columns[:, :n] @ axes, weight * np.sum((columns[:, :n] @ moves) ** 2, axis=0)
-
-        def residuals(rows: Array) -> Array:
-            return np.asarray(root * residuals_at(base, unknowns, rows[:, n_free:], rows[:, :n_free]))
-
         rise = rises(residuals, here, moves, axes, along, root * fit.residual, foretold, n_free)
         matters = np.isfinite(rise) & (foretold > LEAST_RISE * shares**2)
         believed = np.where(matters, np.clip(rise / np.maximum(foretold, 1e-300), 0.0, 1.0), 1.0)
