@@ -22,7 +22,7 @@ from armid.inference.evidence import (
     log_tails,
 )
 from armid.inference.kinds.hypothesis import Hypothesis, Proposal
-from armid.inference.posterior import Atom, Posterior, most_odds, truncated, unbounded
+from armid.inference.posterior import Atom, Posterior, confirmed_slopes, most_odds, truncated, unbounded
 from armid.inference.search import begun
 from armid.model import EFFECTS, Model
 from armid.problem.cover import Cover
@@ -263,3 +263,23 @@ def test_a_parameter_at_its_bound_hides_nothing_of_the_others(tmp_path, write_ax
         np.testing.assert_allclose(np.sqrt(np.diag(unbounded(about))), linear, rtol=0.1)
         held.append(declared.values["viscous.slope"] == 0.0)
     assert 0 < sum(held) < 6
+
+
+def test_slopes_that_a_fit_carried_on_make_no_interval_narrower(tmp_path, write_axis):
+    """Errors of the slopes that nothing takes up would look like information."""
+    rng = np.random.default_rng(3)
+    speed = 4.0 * np.arange(401) / 200.0 + 0.02 * rng.standard_normal(401)
+    campaign = read_campaign(write_axis(tmp_path, speed))
+    library, declared = prepared(Model(campaign.plant) + EFFECTS["viscous"], campaign, {})
+    scale = begun(library, declared).scale()
+    slopes = expansion_of(declared, scale, library).unknowns[:, :2]
+    free = np.flatnonzero(np.array([declared.values[n] for n in ("mass", "viscous.slope")]) > 0.0)
+    right = scale.weight * slopes[:, free].T @ slopes[:, free]
+    deviation = np.sqrt(np.diag(np.linalg.inv(right)))
+    errors = rng.standard_normal((len(slopes), 2)) / np.sqrt(len(slopes)) / deviation.min()
+    wrong = slopes + errors
+    flat = np.full(2, 1e-6)
+    found = confirmed_slopes(declared, wrong, flat, scale.weight)[:, free]
+    again = np.sqrt(np.diag(np.linalg.inv(scale.weight * found.T @ found)))
+    assert (np.sqrt(np.diag(np.linalg.inv(scale.weight * wrong[:, free].T @ wrong[:, free]))) < 0.8 * deviation).all()
+    np.testing.assert_allclose(again, deviation, rtol=0.05)
