@@ -88,9 +88,8 @@ def cells_of(text: str, wide: bool, file: str) -> Cells:
         if len(cells) != n:
             hint = ""
             if separator == "," and len(cells) == 2 * n and all(re.fullmatch(r"[+-]?\d+", c) for c in cells):
-                hint = (
-                    f"; a comma both between columns and in numbers cannot be read: write it anew with {pandas_line()}"
-                )
+                hint = ("; a comma both between columns and in numbers cannot be read: export the file again with a "
+                        "semicolon between columns")  # fmt: skip
             raise ArmidError(f"{file}, line {number}: {len(cells)} values in a row, {n} are expected as in the "
                              f"header{hint}")  # fmt: skip
     if body and (units := units_in(body[0][1])):
