@@ -116,7 +116,7 @@ def test_other_ways_to_write_a_file_are_read_with_one_sentence(content, words):
     ("time_s;a\n1,234;5,678\n", ["line 2", "'1,234' may be 1234 or 1.234", 'sep=";", decimal=","']),
     ("time_s;a\n1.234;5.678\n", ["line 2", "'1.234' may be 1234 or 1.234"]),
     ("time_s;a\n1.234,5;1\n0;1,5\n", None),
-    ("time_s,a\n0,001,1,5\n", ["line 2", "4 values", "semicolon between columns"),
+    ("time_s,a\n0,001,1,5\n", ["line 2", "4 values", "semicolon between columns"]),
     ('time_s,a\n"1,234","5,678"\n', ["line 2", "'1,234' may be"]),
     ("time,s;a\n0,1;2\n0,2;3\n", ["line 1", "',' and ';'", "one separator"]),
     ('time_s,a\n0,"1\n', ["line 2", "quotation mark"]),
