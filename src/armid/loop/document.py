@@ -366,13 +366,15 @@ def models_of(inference: Inference) -> list[dict[str, Any]]:
     entries: dict[str, dict[str, Any]] = {}
     for model, _ in inference.exploration.ranked():
         own = frozenset(h.public for h in model)
-        # a model counts whether or not something unseen acts as well
-        probability = sum(p for names, p in inference.posterior.sets.items() if names - UNSEEN == own)
+        # a model counts whether or not something unseen acts as well, and says which is the likelier
+        sets = inference.posterior.sets
+        probability = sum(p for names, p in sets.items() if names - UNSEEN == own)
+        unseen = " + something unknown" if own and 2 * sets.get(own, 0.0) < probability else ""
         if words(model) not in entries and len(entries) < MOST_DRAWN and (probability >= LISTED or not entries):
             known = {n: i for n, i in inference.of_fit(model).items() if n in inference.exploration.declared.values}
             values = inference.exploration.fits[model].values
             entries[words(model)] = {
-                "model": words(model), "probability": probability,
+                "model": words(model) + unseen, "probability": probability,
                 "parameters": {n: {"value": values[n], "low": i.low, "high": i.high} for n, i in known.items()},
             }  # fmt: skip
     return sorted(entries.values(), key=lambda entry: -entry["probability"])
