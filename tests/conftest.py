@@ -36,15 +36,6 @@ NOT_TRACED = (
     "test_finds_on_one_stroke_what_the_paper_found", "test_another_form_of_an_effect_takes_its_place",
     "test_a_fault_of_one_record_is_told_beside_an_effect", "test_a_fault_that_held_out_records_deny_is_gone_whole",
 )  # fmt: skip
-# Slow tests of these folders, files and tests are nightly: programs next to the package, and many machines one by one.
-NIGHTLY = (
-    "studies", "test_data_checks_outputs.py", "test_declared_outputs.py", "test_fast_motion.py", "test_input_noise.py",
-    "test_loop_run.py", "test_many_records.py", "test_oracles.py", "test_outputs_loop.py", "test_pendulum_in_motion.py",
-    "test_record_faults.py", "test_strangers.py", "test_a_late_control_moves_the_arm_as_on_the_test_stand",
-    "test_identifiers_that_misbehave_fail_alone", "test_right_campaigns_are_not_accused",
-    "test_the_advised_record_tells_apart_and_beats_a_random_one", "test_the_small_blind_suite",
-    "test_values_at_stored_points_of_other_machines",
-)  # fmt: skip
 # Those that take longest come first, so that two processes end together.
 LONGEST = (
     "test_a_late_voltage_is_no_late_torque", "test_the_small_blind_suite", "test_every_effect_keeps_its_contract",
@@ -97,13 +88,13 @@ event.register("numba:compile", Untraced())
 
 
 def pytest_collection_modifyitems(items):
-    """Put the longest tests first, and mark the slow ones that are nightly, and those that coverage leaves out."""
+    """Put the longest tests first, and mark the slow ones that coverage leaves out: what `traced` does not keep."""
     items.sort(key=lambda item: item.name.partition("[")[0] not in LONGEST)
-    for item in (item for item in items if item.get_closest_marker("slow")):
-        parts = item.path.relative_to(ROOT / "tests").parts
-        places = {parts[0], parts[-1], item.name.partition("[")[0]}
-        for mark in ("nightly",) * bool(places & set(NIGHTLY)) + ("no_cover",) * bool(places & set(NOT_TRACED)):
-            item.add_marker(mark)
+    for item in items:
+        places = {item.path.relative_to(ROOT / "tests").parts[0], item.name.partition("[")[0]}
+        slow = item.get_closest_marker("slow")
+        if slow and places & set(NOT_TRACED) and not slow.kwargs.get("traced"):
+            item.add_marker("no_cover")
 
 
 @pytest.hookimpl(wrapper=True)

@@ -101,9 +101,8 @@ def test_continuous_integration_runs_the_readme_s_test_command(blocks, root):
     pattern = re.search(r"grep -m 1 '([^']+)' README\.md", script).group(1)
     found = next(line for line in (root / "README.md").read_text().splitlines() if pattern in line)
     assert found == blocks[1][1].strip()
-    assert '-m "(slow and not nightly) or browser"' in script
-    assert "-m nightly" in (root / ".ci" / "nightly").read_text()
-    assert all(os.access(root / ".ci" / name, os.X_OK) for name in ("run", "nightly"))
+    assert '-m "slow or browser"' in script
+    assert os.access(root / ".ci" / "run", os.X_OK)
 
 
 @pytest.mark.parametrize("page", GUIDES)
@@ -287,7 +286,6 @@ def test_the_package_says_who_made_it_where_it_runs_and_its_workflows_call_ci(re
     assert "**Platforms.** Tested on Linux" in readme
     workflows = {path.name: path.read_text(encoding="utf-8") for path in (root / ".github/workflows").iterdir()}
     assert "- run: .ci/run\n" in workflows["tests.yml"]
-    assert "- run: .ci/nightly\n" in workflows["nightly.yml"]
     assert "mkdocs build --strict -f studies/guide/mkdocs.yml" in workflows["site.yml"]
     assert "[test,notebook,suite,nested,docs,dev]" in (root / ".ci/run").read_text(encoding="utf-8")
 

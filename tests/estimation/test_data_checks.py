@@ -220,7 +220,7 @@ def test_a_clock_is_moved_by_a_time_and_not_by_samples(campaign):
     assert moved(records[1], 5.0).pieces[0] is records[1].pieces[0]
 
 
-@pytest.mark.slow
+@pytest.mark.slow(traced=True)
 @pytest.mark.parametrize("name", MISTAKES)
 def test_a_mistake_is_noticed_and_named(name, campaign):
     kind, made, words = MISTAKES[name]
@@ -269,7 +269,7 @@ def halves(folder, windows):
     return folder
 
 
-@pytest.mark.slow
+@pytest.mark.slow(traced=True)
 def test_a_long_record_is_simulated_whole_only_to_learn_how_few_samples_will_do(campaign, monkeypatch):
     """Most of its motion comes after the samples that the checks begin with, and it is seen all the same."""
     folder, n, steps = campaign("one"), 200_000, []

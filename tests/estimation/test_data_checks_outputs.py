@@ -98,7 +98,7 @@ def test_records_that_all_begin_elsewhere_than_the_model_are_told(tmp_path, begi
         assert re.match(r"angle: every train record begins -11\.\d to -11\.\d deg away from where rotary_arm", sentence)
 
 
-@pytest.mark.slow
+@pytest.mark.slow(traced=True)
 def test_a_range_of_the_plant_that_is_too_narrow_accuses_no_record_and_widens(tmp_path):
     """It is a multiple of the machine's scales: a size to expect, and no limit."""
     read = read_campaign(write_link(tmp_path / "campaign"))

@@ -115,7 +115,7 @@ def held(folder, seed=4):
     return read_campaign(write_records(folder, HEAD.format('["torque_offset"]'), tables))
 
 
-@pytest.mark.slow
+@pytest.mark.slow(traced=True)
 def test_no_fit_of_a_start_takes_up_what_noise_of_an_input_does_later(tmp_path):
     """Such a fit takes the noise as white, and would move the whole record: what is left looks like an offset."""
     read = held(tmp_path / "held")
@@ -155,7 +155,7 @@ def test_how_far_it_moves_the_model_and_that_this_may_be_all_that_remains(tmp_pa
     assert "inputs" not in " ".join(answer(result_of(without), details_of(without)))
 
 
-@pytest.mark.slow
+@pytest.mark.slow(traced=True)
 @pytest.mark.parametrize("measured", [noisy, exact])
 def test_an_interval_holds_what_noise_of_an_input_does_where_fitted_starts_and_the_sensor_hide_it(tmp_path, measured):
     inside, alone = [], []
@@ -239,7 +239,7 @@ def test_the_covariance_of_its_error_is_that_of_drawn_columns(step):
     assert covariance[0, 0] == pytest.approx(least[0], rel=0.25)
 
 
-@pytest.mark.slow
+@pytest.mark.slow(traced=True)
 def test_what_a_right_model_leaves_is_turned_white(tmp_path):
     """Of many torques with noise on the same motion; whitened, the misfit of the true model is noise."""
     chi2, lags = [], []

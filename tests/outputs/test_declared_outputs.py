@@ -22,7 +22,7 @@ START = np.array([0.1, 0.5, 0.05, 0.4])
 STARTS = dict(zip(("start_motor", "start_motor_speed", "start_load", "start_load_speed"), START, strict=True))
 
 
-@pytest.mark.slow
+@pytest.mark.slow(traced=True)
 def test_one_simulation_gives_all_outputs_as_scipy_does_and_loses_all_where_it_diverges():
     u = drive(400, 1.0)
     run = simulate(Model(two_inertias), Manoeuvre(INTERVAL, 400, STARTS, {"u": u}), list(TRUTH.values()), Schedule(8))

@@ -177,7 +177,7 @@ def test_armid_reads_a_campaign_of_every_machine_and_the_key_holds_its_truth(eve
         assert set(entry["parameters"]) == {p.name for p in campaign.plant.parameters}
 
 
-@pytest.mark.slow
+@pytest.mark.slow(traced=True)
 def test_noise_in_a_record_is_what_the_key_says():
     planned, rng = plan(12, 0, ["hydraulic_boom"])
     campaign = drawn(planned, rng)

@@ -75,7 +75,7 @@ def test_a_full_disk_is_told_and_harms_nothing(start, write_study, tmp_path, sma
     assert same_results(load_study(out), undisturbed)
 
 
-@pytest.mark.slow
+@pytest.mark.slow(traced=True)
 def test_a_read_only_folder_can_be_read_and_is_told_when_written(write_study, small_disk, undisturbed):
     remount(small_disk, "size=20m")
     shutil.copytree(undisturbed.path.parent, small_disk / "out")
@@ -195,7 +195,7 @@ def test_a_worker_that_cannot_start_is_told(write_study, tmp_path, monkeypatch):
         run_study(write_study(), jobs=1, out=tmp_path / "out")
 
 
-@pytest.mark.slow
+@pytest.mark.slow(traced=True)
 def test_a_script_without_a_main_guard_runs_a_study(write_study, tmp_path):
     script = tmp_path / "script.py"
     called = f"run_study({str(write_study(1))!r}, 1, out={str(tmp_path / 'out')!r}, only='row 1/random')"

@@ -110,7 +110,7 @@ def test_an_interrupt_of_the_workers_cuts_no_run(start, write_study, tmp_path, u
     assert same_results(load_study(tmp_path / "out"), undisturbed)
 
 
-@pytest.mark.slow
+@pytest.mark.slow(traced=True)
 def test_ctrl_c_keeps_what_is_finished_and_says_how_to_go_on(start, write_study, tmp_path):
     process = start(write_study(60), "--out", tmp_path / "out", "--jobs", 2)
     wait_for(process, tmp_path / "out", 3)

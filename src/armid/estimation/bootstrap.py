@@ -208,6 +208,7 @@ def refined(task: Task, measured: Array, rng: np.random.Generator, progress: Cal
     moved = (minimum - x) / np.maximum(deviation, 1e-300)
     scatter = Scatter(kept, low, high, kept.mean(axis=0) - x, moved)
     if lost[0] or np.any((x < low) | (x > high)):
+        scatter = replace(scatter, low=low + x - minimum, high=high + x - minimum)
         return replace(scatter, doubt=f"the search has not come to the minimum of {task.fitness.name}", is_far=True)
     return scatter
 
