@@ -76,7 +76,7 @@ def on_a_line(sentence: str) -> str:
 
 # Longest list of valid words that a message shows in full [letters].
 LONGEST_LIST = 120
-# Words that a hint names which begin as what was written.
+# Valid words that a hint names where several begin with the word that was written.
 MOST_BEGUN = 4
 
 
@@ -91,8 +91,8 @@ def nearest(word: str, known: Iterable[str]) -> str:
     'known: coulomb, viscous'
     """
     words = [str(k) for k in known]
-    begun = [w for w in words if w.startswith(f"{word}_") or w.startswith(f"{word}/")]
-    if word and len(begun) > 1:
+    begun = [w for w in words if w.startswith((f"{word}_", f"{word}/"))]
+    if len(begun) > 1:
         return f"did you mean one of {', '.join(begun[:MOST_BEGUN])}?"
     close = get_close_matches(word, words, n=1, cutoff=0.6)
     if close:

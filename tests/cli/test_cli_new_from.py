@@ -94,8 +94,8 @@ def test_times_of_day_in_some_files_alone_are_refused(refused, tmp_path):
         (tmp_path / file).write_text("\n".join(["Time,drive_V,angle_deg", *rows]))
     for files, words in ((("a.csv", "b.csv"), "numbers, times of day are expected"),
                          (("b.csv", "a.csv"), "times of day, numbers are expected")):  # fmt: skip
-        said = refused("new", "campaign", "m", "--from", *files)
-        assert f"line 1: 'Time' holds {words}, as in the first file" in said
+        sentence = refused("new", "campaign", "m", "--from", *files)
+        assert f"line 1: 'Time' holds {words}, as in the first file" in sentence
 
 
 @pytest.mark.slow(traced=True)

@@ -111,8 +111,8 @@ def test_arguments_with_a_default_are_options_of_a_user_s_search():
     assert (set(middle), set(corner)) == ({0.5}, {1.0})
     wrong = (({"step": "big"}, "step is 'big', expected a number as its default 0.2"),
              ({"way": True}, "way is True, expected a text"), ({"stop": 1}, "did you mean 'step'"))  # fmt: skip
-    for given, said in wrong:
-        with pytest.raises(ArmidError, match=said):
+    for given, sentence in wrong:
+        with pytest.raises(ArmidError, match=sentence):
             own.with_options(given).build(10)
     with pytest.raises(ArmidError, match="has an argument 'popsize' without a default, which an option needs: known"):
         as_identifier("mine", lambda value, popsize: None)

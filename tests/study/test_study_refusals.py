@@ -74,8 +74,8 @@ def test_refused_with_one_sentence(write_study, tmp_path):
 
 
 def test_bounds_in_another_unit_are_told(write_study):
-    told = pytest.warns(UserWarning, match="bounds p0 = 2.6 to 3.5 is far outside the declared range")
-    with told, pytest.raises(ArmidError, match=r"outside its bounds 2.6 to 3.5"):
+    warned = pytest.warns(UserWarning, match="bounds p0 = 2.6 to 3.5 is far outside the declared range")
+    with warned, pytest.raises(ArmidError, match=r"outside its bounds 2.6 to 3.5"):
         read_study(write_study(more="[bounds]\np0 = [2.6, 3.5]\n"))
 
 

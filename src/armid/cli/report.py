@@ -14,6 +14,7 @@ from armid.report.result import (
     IDENTIFIABILITY,
     IDENTIFICATION,
     LOOP,
+    STUDY_FILE,
     Kind,
     NewFiles,
     Result,
@@ -42,7 +43,7 @@ def made_by() -> dict[str, Any]:
     return {"command": shlex.join(["armid", *words]), "settings": settings}
 
 
-STUDY_FILE, PAGE_FILE = "study.sqlite", "report.html"
+PAGE_FILE = "report.html"
 
 
 @command("report", short_help="Write the page of stored results.", epilog=examples(

@@ -285,10 +285,10 @@ def run(identifier: Identifier, seed: int, problem: Trial | None = None, noise: 
     """Run an identifier on a trial problem; noise: state of the global generators, which must not matter."""
     trial = Trial(Meter(TRIAL_BUDGET)) if problem is None else problem
     assert trial.meter is not None
-    with global_generators(noise), warnings.catch_warnings(record=True) as told:
+    with global_generators(noise), warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", OutsideWarning)
         minimize(trial, identifier.build(TRIAL_BUDGET), MeterTermination(trial.meter), seed=seed, copy_algorithm=False)
-    for warning in told:
+    for warning in caught:
         if warning.category is OutsideWarning:
             trial.moved = str(warning.message)
         else:

@@ -8,7 +8,7 @@ of them is one population of the engine. Parameters are whitened by the Cramer-R
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -57,10 +57,11 @@ class Scatter:
     """How the estimates of a bootstrap scatter.
 
     draws: estimates that converged, SI, (n_draws, n_free). low, high: ends of the 95 % interval, SI, (n_free,), about
-    the minimum that a refinement of the estimate finds, since a search stops short of it: that minimum +- 1.96 standard
-    deviations, and the quantiles of the draws where these are skewed. bias: mean of the draws less the estimate that
-    they were simulated at, SI, (n_free,). moved: how far the refinement moves the estimate, in standard deviations.
-    doubt: why there is no interval, "" where there is one. is_far: the estimate lies outside its interval.
+    the minimum that a refinement of the estimate finds, since a search stops short of it: +- 1.96 standard deviations,
+    and the quantiles of the draws where these are skewed. bias: mean of the draws less the estimate that they were
+    simulated at, SI, (n_free,). moved: how far the refinement moves the estimate, in standard deviations. doubt: why
+    there is no interval, "" where there is one. is_far: the minimum is farther away than that; low, high then lie about
+    the estimate.
     """
 
     draws: Array
@@ -182,7 +183,7 @@ class Task:
 
 
 def refined(task: Task, measured: Array, rng: np.random.Generator, progress: Callable[[Refined], bool]) -> Scatter:
-    """Minimise the fitness for each draw from the estimate; the first of them is the measurement itself."""
+    """Minimise the fitness for each draw about the estimate; the first of them is the measurement itself."""
     # The minimum of some fitnesses is a plateau, on which a search ends anywhere: none starts at the estimate.
     start = FIRST_STEP * rng.standard_normal((len(measured), len(task.x)))
     searches, state = ParallelCmaes(start), Refined(len(measured) - 1)
@@ -200,17 +201,14 @@ def refined(task: Task, measured: Array, rng: np.random.Generator, progress: Cal
         return without(task.x, f"the fitness does not converge in {n_lost} draws of the noise")
     x, minimum, kept = task.x, draws[0], draws[1:][~lost[1:]]
     deviation = np.std(kept, axis=0, ddof=1)
-    low, high = minimum - NORMAL_95 * deviation, minimum + NORMAL_95 * deviation
-    skewed = np.abs(skew(kept)) > SKEWED
+    ends = np.array([-NORMAL_95 * deviation, NORMAL_95 * deviation])
     if len(kept) > FIRST_DRAWS:
-        ends = np.quantile(kept, (0.025, 0.975), axis=0) + minimum - x
-        low, high = np.where(skewed, ends[0], low), np.where(skewed, ends[1], high)
+        ends = np.where(np.abs(skew(kept)) > SKEWED, np.quantile(kept, (0.025, 0.975), axis=0) - x, ends)
     moved = (minimum - x) / np.maximum(deviation, 1e-300)
-    scatter = Scatter(kept, low, high, kept.mean(axis=0) - x, moved)
-    if lost[0] or np.any((x < low) | (x > high)):
-        scatter = replace(scatter, low=low + x - minimum, high=high + x - minimum)
-        return replace(scatter, doubt=f"the search has not come to the minimum of {task.fitness.name}", is_far=True)
-    return scatter
+    is_far = bool(lost[0] or np.any((x - minimum < ends[0]) | (x - minimum > ends[1])))
+    low, high = (x if is_far else minimum) + ends
+    doubt = f"the search has not come to the minimum of {task.fitness.name}" if is_far else ""
+    return Scatter(kept, low, high, kept.mean(axis=0) - x, moved, doubt, is_far)
 
 
 class ParallelCmaes:

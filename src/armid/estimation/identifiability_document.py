@@ -9,7 +9,7 @@ import numpy as np
 from armid.estimation.design import Offer, identity
 from armid.estimation.examine import Examination, Group, collinearity_index
 from armid.estimation.identify import versions_of
-from armid.estimation.identify_document import PAIRS, pairs_of
+from armid.estimation.identify_document import PAIRS, WIDENED, beyond_noise, pairs_of
 from armid.estimation.information import PROFILE_RISE, Profile, normalised, sensitivities
 from armid.estimation.noise_model import Level, level_weights
 from armid.model import Array
@@ -302,17 +302,14 @@ def level_remarks(examination: Examination) -> list[str]:
 
 def misfit_remark(examination: Examination) -> str:
     """Return which records hold more than noise, and what that does to the intervals, "" for none."""
-    pairs = zip(examination.replays, examination.information.levels, strict=True)
-    times = {r.name: level.rms / r.record.noise.rms if r.record.noise.rms else np.inf
-             for r, level in pairs if level.from_residual}  # fmt: skip
+    times = beyond_noise(examination.replays, examination.information)
     if not times:
         return ""
     low, high = (f"{end(times.values()):.2g}" for end in (min, max))
     span = low if low == high else f"{low} to {high}"
     many = f" and {len(times) - MOST_GROUPS_SHOWN} more" if len(times) > MOST_GROUPS_SHOWN else ""
     return (f"The model lacks something or a constant is off: the residual is {span} times the noise in "
-            f"{listed(list(times)[:MOST_GROUPS_SHOWN])}{many}. The intervals are widened to the residual and its "
-            "correlation in time, and hold only as far as what is lacking averages out.")  # fmt: skip
+            f"{listed(list(times)[:MOST_GROUPS_SHOWN])}{many}. {WIDENED}")  # fmt: skip
 
 
 def level_text(level: Level, unit: str, noise: float) -> str:

@@ -21,6 +21,7 @@ from armid.estimation.input_noise import moved_by_inputs, pooled_noise
 from armid.estimation.least_squares import held_by_bound, refine, with_fitted_starts
 from armid.estimation.noise_model import MISFIT, Level, NoiseModel, known_level, level_of
 from armid.identifiers import Identifier, run
+from armid.identifiers.own import OUT_OF_BOX
 from armid.model import Array, Model
 from armid.problem.fitness import Fitness, chi_square, mean_square
 from armid.problem.meter import BudgetIgnoredError, Meter
@@ -49,16 +50,13 @@ if TYPE_CHECKING:
 
 # Share of a range within which a parameter is on its bound.
 ON_BOUND = 1e-12
-# A search that ends farther outside than this has left the box.
-OUT_OF_BOX = 1e-9
-
 
 WAS_INTERRUPTED = "interrupted"
 # Two estimates of one model that are more of their standard deviations apart than this are not of the same minimum.
 APART_IN_DEVIATIONS = 5.0
 # A least-squares step of more standard deviations than this: a search by another fitness ends within a few.
 FAR_FROM_MINIMUM = 4.0
-# Share of the squares that such a step would take away, where what is left tells of the search and not of the model.
+# Share of the squares that such a step removes. Above it the search has not converged, and the model is not to blame.
 MOST_GAIN = 0.5
 # An estimate that is biased by more standard deviations has an interval that misses the truth in more than 8 %.
 BIASED = 0.5

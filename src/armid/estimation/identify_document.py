@@ -61,7 +61,7 @@ PAIRS = (
 FIGURES = {"convergence": ("The search", "Best so far against the number of simulations."), "pairs": PAIRS}
 MOST_KNOWN_FIRST = 3
 # Constants within tolerances that a sentence names.
-MOST_TOLD = 6
+MOST_TOLERANCES = 6
 # A mean square on held-out records of more times that on the fitted ones than this.
 CARRIES_OVER = 1.5
 # Of more records than this one sentence tells.
@@ -122,7 +122,8 @@ def identify_document(
 def answer(result: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, ...]:
     free = {name: p for name, p in result["parameters"].items() if p["bound_low"] is not None}
     known = list(details.get("within_tolerances", ()))
-    exact = ", ".join(known[:MOST_TOLD]) + (f" and {len(known) - MOST_TOLD} more" if len(known) > MOST_TOLD else "")
+    more = f" and {len(known) - MOST_TOLERANCES} more" if len(known) > MOST_TOLERANCES else ""
+    exact = ", ".join(known[:MOST_TOLERANCES]) + more
     begins = lead(free, result["error"]["holdout"] is not None)
     begins += " (constants count as exact)" if exact and any(p["low"] is not None for p in free.values()) else ""
     lost = [name for name, p in free.items() if p["low"] is None and p.get("interval_by") != "bootstrap"]
@@ -344,21 +345,30 @@ def noise_remarks(identification: Identification) -> list[str]:
     return texts
 
 
+WIDENED = (
+    "The intervals are widened to the residual and its correlation in time, and hold only as far as what is lacking "
+    "averages out."
+)
+
+
+def beyond_noise(replays: Sequence[Replay], information: Information) -> dict[str, float]:
+    """Return signal -> its residual in units of its noise, of signals that hold more than noise."""
+    return {r.name: level.rms / r.record.noise.rms if r.record.noise.rms else np.inf
+            for r, level in zip(replays, information.levels, strict=True) if level.from_residual}  # fmt: skip
+
+
 def misfit_remarks(identification: Identification) -> list[str]:
-    replays = judged_by(identification.fitness, identification.train_replays)
-    pairs = zip(replays, identification.information.levels, strict=True)
-    above = [(level.rms / r.record.noise.rms if r.record.noise.rms else np.inf, r.name)
-             for r, level in pairs if level.from_residual]  # fmt: skip
+    above = beyond_noise(judged_by(identification.fitness, identification.train_replays), identification.information)
     if not above:
         return []
-    text = ", ".join(f"{times:.3g} in {file}" for times, file in sorted(above, reverse=True)[:MOST_REMARKS])
+    largest = sorted(((times, name) for name, times in above.items()), reverse=True)[:MOST_REMARKS]
+    text = ", ".join(f"{times:.3g} in {name}" for times, name in largest)
     more = f" and {len(above) - MOST_REMARKS} signals more" if len(above) > MOST_REMARKS else ""
     why = "the model, in which nothing is free, lacks something."
     if identification.space.free.any():
         why = (
             "the model lacks something, a constant is off, an input is noisy, the sensor is noisier in motion, or the "
-            "search has not come to the minimum. The intervals are widened to the residual and its correlation in "
-            "time, and hold only as far as what is lacking averages out."
+            f"search has not come to the minimum. {WIDENED}"
         )
     return [f"The residual is this many times the noise: {text}{more}: {why}"]
 

@@ -26,8 +26,8 @@ from armid.problem.meter import PENALTY
 SEARCH_ARGUMENTS = ("value", "low", "high", "budget", "random", "start")
 # Kinds of options of a function, in words; true is a number, too, so that it comes first.
 OPTION_KINDS: dict[Any, str] = {bool: "true or false", int | float | np.number: "a number", str: "a text"}
-# Share of the box by which a candidate may lie outside by rounding.
-ROUNDING = 1e-9
+# A candidate that lies farther outside than this share of its range has left the box; closer is rounding.
+OUT_OF_BOX = 1e-9
 
 
 def as_identifier(name: str, obj: Any) -> Identifier:
@@ -72,13 +72,14 @@ def as_identifier(name: str, obj: Any) -> Identifier:
         raise ArmidError(f"identifier '{name}' is a {type(obj).__name__} that was used already, {expected}")
     if isinstance(obj, type) and issubclass(obj, Algorithm) and accepts(obj):
         return Identifier(name, lambda budget: obj(), "a class of the user")
-    if callable(obj) and not isinstance(obj, type) and "value" in arguments_of(obj):
-        needed = [argument for argument, p in arguments_of(obj).items() if p.default is p.empty]
-        for argument in set(needed) - set(SEARCH_ARGUMENTS):
+    arguments = {} if isinstance(obj, type) else arguments_of(obj)
+    if callable(obj) and "value" in arguments:
+        unknown = [a for a, p in arguments.items() if p.default is p.empty and a not in SEARCH_ARGUMENTS]
+        for argument in unknown:
             raise ArmidError(f"identifier '{name}' has an argument '{argument}' without a default, which an option "
                              f"needs: {nearest(argument, SEARCH_ARGUMENTS)}")  # fmt: skip
         note = (inspect.getdoc(obj) or "a search of the user").partition("\n")[0]
-        return declared(name, note, own_search(name, obj), is_global="start" not in arguments_of(obj))
+        return declared(name, note, own_search(name, obj), is_global="start" not in arguments)
     if callable(obj) and not isinstance(obj, type) and accepts(obj, 1):
         return Identifier(name, partial(built, name, obj), "a function of the user")
     raise ArmidError(f"identifier '{name}' is {obj!r}, {expected}")
@@ -137,9 +138,9 @@ def own_search(name: str, function: Callable[..., Any]) -> type[OwnSearch]:
             if hasattr(OwnSearch, argument.name):
                 raise ArmidError(f"identifier '{name}': an option cannot be called '{argument.name}', another name is "
                                  "expected")  # fmt: skip
-            told = getattr(argument.annotation, "__metadata__", ())
-            ends = next((ends for ends in told if isinstance(ends, tuple) and len(ends) == 2), None)
-            meaning = next((text for text in told if isinstance(text, str)), "")
+            notes = getattr(argument.annotation, "__metadata__", ())
+            ends = next((note for note in notes if isinstance(note, tuple) and len(note) == 2), None)
+            meaning = next((note for note in notes if isinstance(note, str)), "")
             made.append((argument.name, Any, option(argument.default, meaning, "", tune=ends)))
     namespace = {"function": staticmethod(function)}
     return make_dataclass(name, made, bases=(OwnSearch,), namespace=namespace, frozen=True)
@@ -172,7 +173,7 @@ class Value:
             raise ArmidError(f"`value` was given an array of shape {x.shape}, one candidate ({n},) or several "
                              f"(n_candidates, {n}) are expected")  # fmt: skip
         X = np.atleast_2d(x)
-        rounding = ROUNDING * (self.high - self.low)
+        rounding = OUT_OF_BOX * (self.high - self.low)
         self.n_outside += int(((self.low - rounding > X) | (self.high + rounding < X)).any(axis=1).sum())
         return np.clip(X, self.low, self.high)
 

@@ -336,24 +336,23 @@ def confirmed_slopes(fit: Fit, columns: Array, flat: Array, weight: float) -> Ar
     def residuals(rows: Array) -> Array:
         return np.asarray(root * residuals_at(base, unknowns, rows[:, n_free:], rows[:, :n_free]))
 
-    def axes_and_room(columns: Array) -> tuple[Array, Array]:
+    def axes_and_moves(columns: Array) -> tuple[Array, Array, Array]:
         axes = np.zeros((n, moving.size))
         axes[moving] = principal_axes(columns[:, counted], flat[counted], weight, moving.size)
-        return axes, room(here[:n_free], DEVIATIONS * axes[:n_free])
+        shares = room(here[:n_free], DEVIATIONS * axes[:n_free])
+        return axes, shares, DEVIATIONS * shares * axes
 
-    if moving.size:
-        axes, shares = axes_and_room(columns)
-        moves = DEVIATIONS * shares * axes
-        below, above = np.split(residuals(np.concatenate([here - moves.T, here + moves.T])) / root, 2)
-        along = columns[:, :n] @ axes
-        chords = (below - above).T / np.maximum(2.0 * DEVIATIONS * shares, 1e-300)
-        shown = weight * np.sum(along**2, axis=0) * (shares == 1.0) > BELIEVED
-        shown &= np.isfinite(chords).all(axis=0)
-        columns = columns.copy()
-        columns[:, moving] = np.where(shown, chords, along) @ np.linalg.inv(axes[moving])
-    for _ in range(MOST_LOOKS if moving.size else 0):
-        axes, shares = axes_and_room(columns)
-        moves = DEVIATIONS * shares * axes
+    if not moving.size:
+        return columns
+    axes, shares, moves = axes_and_moves(columns)
+    below, above = np.split(residuals(np.concatenate([here - moves.T, here + moves.T])) / root, 2)
+    along = columns[:, :n] @ axes
+    chords = (below - above).T / np.maximum(2.0 * DEVIATIONS * shares, 1e-300)
+    shown = (shares == 1.0) & (weight * np.sum(along**2, axis=0) > BELIEVED) & np.isfinite(chords).all(axis=0)
+    columns = columns.copy()
+    columns[:, moving] = np.where(shown, chords, along) @ np.linalg.inv(axes[moving])
+    for _ in range(MOST_LOOKS):
+        axes, shares, moves = axes_and_moves(columns)
         along, foretold = root * columns[:, :n] @ axes, weight * np.sum((columns[:, :n] @ moves) ** 2, axis=0)
         rise = rises(residuals, here, moves, axes, along, root * fit.residual, foretold, n_free)
         matters = np.isfinite(rise) & (foretold > LEAST_RISE * shares**2)

@@ -364,10 +364,10 @@ def details_of(loop: ClosedLoop) -> dict[str, Any]:
 def models_of(inference: Inference) -> list[dict[str, Any]]:
     """Return the most probable models with the parameters of the declared model, were each true."""
     entries: dict[str, dict[str, Any]] = {}
+    sets = inference.posterior.sets
     for model, _ in inference.exploration.ranked():
         own = frozenset(h.public for h in model)
-        # a model counts whether or not something unseen acts as well, and says which is the likelier
-        sets = inference.posterior.sets
+        # a model counts with and without something unseen; its name holds the likelier case
         probability = sum(p for names, p in sets.items() if names - UNSEEN == own)
         unseen = " + something unknown" if own and 2 * sets.get(own, 0.0) < probability else ""
         if words(model) not in entries and len(entries) < MOST_DRAWN and (probability >= LISTED or not entries):

@@ -122,7 +122,7 @@ def check_names(names: Sequence[str], line: int, file: str) -> None:
             raise ArmidError(f"{where}: column {quoted(name)} is there twice, each name once is expected")
 
 
-def pandas_line(arguments: str = 'sep=";", decimal=","') -> str:
+def pandas_line(arguments: str) -> str:
     return f"pandas.read_csv(FILE, {arguments}).to_csv(FILE, index=False)"
 
 

@@ -80,8 +80,9 @@ IDENTIFICATION = Kind("armid identify", "result.json", "report.html", "report.md
 IDENTIFIABILITY = Kind("armid identifiability", "identifiability.json", "identifiability.html", "identifiability.md",
                        "armid.estimation.identifiability_document", "identifiability_document", "")  # fmt: skip
 LOOP = Kind("armid close-loop", "report.json", "report.html", "report.md", "armid.loop.document", "loop_document")
+STUDY_FILE = "study.sqlite"
 # File -> what makes it with a page report.html, which would take the place of the page of another.
-OWN_FOLDER = {IDENTIFICATION.file: IDENTIFICATION.command, LOOP.file: LOOP.command, "study.sqlite": "armid study"}
+OWN_FOLDER = {IDENTIFICATION.file: IDENTIFICATION.command, LOOP.file: LOOP.command, STUDY_FILE: "armid study"}
 
 
 class Shown:

@@ -179,11 +179,11 @@ def convergence_parts(evidence: Evidence) -> Sequence[Part]:
     for name in names:
         own = (evidence.runs["fitness"] == name).to_numpy()
         unit, factor = evidence.scale_of_fitness(name)
-        told = f"1 - {name}" if name.partition(":")[0] in SIMILARITIES else name
-        label = f"best fitness ({told}{unit})"
+        drawn = f"1 - {name}" if name.partition(":")[0] in SIMILARITIES else name
+        label = f"best fitness ({drawn}{unit})"
         draw = partial(convergence_figure, evidence, own, factor * kept.values, label, LEAST_FITNESS)
         file = slug("convergence", name) if len(names) > 1 else "convergence_fitness"
-        figures.append(Figure(file, f"Convergence of {name}", FITNESS_CAPTION.format(fitness=told), draw))
+        figures.append(Figure(file, f"Convergence of {name}", FITNESS_CAPTION.format(fitness=drawn), draw))
     return figures
 
 
