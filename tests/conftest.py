@@ -26,16 +26,6 @@ from input_texts import TABLE_STUDY
 settings.register_profile("armid", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("armid")
 ROOT = Path(__file__).parents[1]
-# Fast tests, or other loops, run the lines of these folders, files and tests too: their slow ones go without the tracer
-# of coverage, which makes them up to twice as long.
-NOT_TRACED = (
-    "analyses", "bench", "contract", "engine", "estimation", "identifiers", "model", "problem", "report", "studies",
-    "study", "test_golden_outputs.py",
-    "test_every_snippet_runs_and_every_output_is_true",
-    "test_holdout_records_decide_nothing", "test_the_advised_record_tells_apart_and_beats_a_random_one",
-    "test_finds_on_one_stroke_what_the_paper_found", "test_another_form_of_an_effect_takes_its_place",
-    "test_a_fault_of_one_record_is_told_beside_an_effect", "test_a_fault_that_held_out_records_deny_is_gone_whole",
-)  # fmt: skip
 # Those that take longest come first, so that two processes end together.
 LONGEST = (
     "test_a_late_voltage_is_no_late_torque", "test_the_small_blind_suite", "test_every_effect_keeps_its_contract",
@@ -87,14 +77,13 @@ class Untraced(event.Listener):
 event.register("numba:compile", Untraced())
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Put the longest tests first, and mark the slow ones that coverage leaves out: what `traced` does not keep."""
+    """Put the longest tests first; those of the night are slow too, so that "not slow" leaves them out."""
     items.sort(key=lambda item: item.name.partition("[")[0] not in LONGEST)
     for item in items:
-        places = {item.path.relative_to(ROOT / "tests").parts[0], item.name.partition("[")[0]}
-        slow = item.get_closest_marker("slow")
-        if slow and places & set(NOT_TRACED) and not slow.kwargs.get("traced"):
-            item.add_marker("no_cover")
+        if item.get_closest_marker("nightly"):
+            item.add_marker("slow")
 
 
 @pytest.hookimpl(wrapper=True)

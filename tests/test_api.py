@@ -366,7 +366,7 @@ def test_the_log_is_printed_from_a_level_on(capsys):
     assert capsys.readouterr().err == "armid: compiling\n"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_study_shows_itself(table_study, tmp_path, monkeypatch):
     monkeypatch.setattr("armid.report.files.save", not_drawn)
     out = copytree(table_study / "out", tmp_path / "out")

@@ -140,7 +140,7 @@ def pairs(table):
     return [table] if {"rmse", "value"} & set(table) else [found for inner in table.values() for found in pairs(inner)]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", CAMPAIGNS)
 def test_closing_the_loop(name):
     assert_same(loop_digest(reported(armid.close_loop(ROOT / "studies" / "campaigns" / name))), golden("loops")[name])
@@ -179,7 +179,7 @@ def test_the_small_table(tmp_path):
         assert error == pytest.approx(error_then, rel=0.1, abs=0.1 if stopped_early else 1e-4), what
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_small_blind_suite(tmp_path, monkeypatch):
     wanted = {case: said for case, said in golden("blind_short").items() if case in BLIND}
     text = (ROOT / "studies" / "blind_short.toml").read_text(encoding="utf-8")

@@ -27,6 +27,8 @@ PAGES = "studies/guide/pages"
 TOUR, START = f"{PAGES}/tour.md", f"{PAGES}/getting_started.md"
 CHOICE = f"{PAGES}/which_identifier.md"
 RUN = (TOUR, START, CHOICE, f"{PAGES}/paper.md")
+# The pages that .ci/run tries; the others are tried each night.
+SHORT = (START,)
 # Minutes and more.
 LONG = ("studies/table1", "out/table1")
 GUIDES = ("README.md", TOUR, START, f"{PAGES}/your_machine.md", f"{PAGES}/suite.md")
@@ -101,8 +103,9 @@ def test_continuous_integration_runs_the_readme_s_test_command(blocks, root):
     pattern = re.search(r"grep -m 1 '([^']+)' README\.md", script).group(1)
     found = next(line for line in (root / "README.md").read_text().splitlines() if pattern in line)
     assert found == blocks[1][1].strip()
-    assert '-m "slow or browser"' in script
-    assert os.access(root / ".ci" / "run", os.X_OK)
+    assert '-m "(slow or browser) and not nightly"' in script
+    assert "-m nightly" in (root / ".ci" / "nightly").read_text()
+    assert all(os.access(root / ".ci" / name, os.X_OK) for name in ("run", "nightly"))
 
 
 @pytest.mark.parametrize("page", GUIDES)
@@ -217,7 +220,7 @@ def ran(line, capsys):
 
 @pytest.mark.slow
 @pytest.mark.filterwarnings("ignore::armid.record.IrregularSamplingWarning")
-@pytest.mark.parametrize("page", RUN)
+@pytest.mark.parametrize("page", [p if p in SHORT else pytest.param(p, marks=pytest.mark.nightly) for p in RUN])
 def test_every_snippet_runs_and_every_output_is_true(page, root, elsewhere, capsys):
     printed, seen = "", {"file": 0, "command": 0, "output": 0}
     for language, text in FENCE.findall((root / os.environ.get("ARMID_TOUR", page)).read_text(encoding="utf-8")):
@@ -286,6 +289,7 @@ def test_the_package_says_who_made_it_where_it_runs_and_its_workflows_call_ci(re
     assert "**Platforms.** Tested on Linux" in readme
     workflows = {path.name: path.read_text(encoding="utf-8") for path in (root / ".github/workflows").iterdir()}
     assert "- run: .ci/run\n" in workflows["tests.yml"]
+    assert "- run: .ci/nightly\n" in workflows["nightly.yml"]
     assert "mkdocs build --strict -f studies/guide/mkdocs.yml" in workflows["site.yml"]
     assert "[test,notebook,suite,nested,docs,dev]" in (root / ".ci/run").read_text(encoding="utf-8")
 

@@ -49,7 +49,7 @@ def drawn(results):
     return {part.name for part in (*document.tables, *document.figures)}
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_the_page_has_every_file_table_and_figure_and_tells_what_it_is_made_of(table1_report):
     folder, names = table1_report
     assert sorted(p.name for p in folder.iterdir()) == sorted(names)
@@ -74,7 +74,7 @@ def test_the_page_has_every_file_table_and_figure_and_tells_what_it_is_made_of(t
     assert r"diverged\\{[}\%]" in latex
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_same_results_give_the_same_bytes_in_another_process_and_order(table1_report, tmp_path):
     """Neither hash seeds nor the order in which two runners have finished the runs enter."""
     code = (
@@ -105,7 +105,7 @@ def test_a_study_that_is_not_complete_says_so_first_and_what_cannot_be_reported_
         report_of(replace(results, study=results.study | {"kind": "loop"}))
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 @pytest.mark.parametrize(("change", "there"), [
     ({"noises": (0.3,), "identifiers": {"pso": 1e-3}, "failed": 1}, {"overview", "ecdf", "runs"}),
     ({"noises": (0.0,), "identifiers": {"pso": 1e-3, "de": 1e-2}, "fitness": ("rmse", "similarity")},

@@ -62,7 +62,7 @@ def test_a_full_disk_leaves_nothing_half_written(run, synthetic_axis, disk, comm
     assert sorted(p.name for p in folder.iterdir()) == ["kept", *fits]
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 @pytest.mark.parametrize(("closed", "more", "code"), [
     ((1,), (), 0), ((2,), ("--quiet",), 0), ((0, 1, 2), ("--json",), 0), ((0, 1, 2), ("--budget", "x"), 2),
 ])  # fmt: skip

@@ -26,7 +26,7 @@ def identified(run, small_folder, tmp_path):
     return written
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_prints_tables_and_remarks_in_units_that_people_read(run, paper_arm_folder):
     ran = run("identify", paper_arm_folder, "--budget", "800", "--identifier", "pso", "--fitness", "similarity")
     assert (ran.code, ran.err) == (0, "")
@@ -41,7 +41,7 @@ def test_prints_tables_and_remarks_in_units_that_people_read(run, paper_arm_fold
     assert max(len(line) for line in ran.out.splitlines() if "│" in line) <= 80
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_writes_result_and_figures_the_same_bits_in_another_process(identified, small_folder, tmp_path):
     text, result = identified("--seed", "7")
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
@@ -77,7 +77,7 @@ def test_fixed_values_and_bounds(identified):
     assert re.search(r"n +│ +1\.4 +│ 1 +│ fixed", text)
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_effects_fitness_and_identifier_also_of_a_user_on_an_axis(identified, mine, write_axis, tmp_path):
     axis = write_axis(tmp_path / "axis")
     options = ("--window", "0:2", "--effects", "coulomb, viscous", "--bounds", "coulomb.width=0.001:0.1", "--fitness")

@@ -98,7 +98,7 @@ def test_times_of_day_in_some_files_alone_are_refused(refused, tmp_path):
         assert f"line 1: 'Time' holds {words}, as in the first file" in sentence
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_a_drive_that_never_changes_is_asked_about(run, tmp_path):
     times, _, speed, _ = wheel(5)
     write(tmp_path / "motor.csv", "time_s,drive_V,angular_velocity_rad_s", times, np.full(N, 3.0), speed)
@@ -189,7 +189,7 @@ def test_an_unknown_unit_and_a_time_that_falls_are_refused_and_an_input_may_have
     assert run("check", "wheel").code == 0
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_the_plant_of_a_plug_in_is_the_one_of_the_campaign(run, refused):
     times, drive, speed, _ = wheel(5)
     write(Path("a.csv"), "t_s,motor_V,speed_km_h,speed_rad_s", times, drive, 3.6 * speed, speed)
@@ -216,7 +216,7 @@ slide = Plant(
 """
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_a_position_of_a_linear_axis_is_what_a_plant_of_armid_and_the_plant_of_a_plug_in_reads(run, refused):
     times, drive, _, angle = wheel(5)
     write(Path("a.csv"), "t_s,motor [mV],slide_mm", times, drive, angle)

@@ -126,7 +126,7 @@ def test_without_a_command_the_help_is_shown_and_the_version_is_told(run):
     assert re.fullmatch(r"armid, version \d+\.\d+\.\d+\n", run("--version").out)
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_a_reader_that_leaves_changes_nothing_but_what_he_reads(small_folder, root, tmp_path):
     """As `| head -1` leaves, and `2>&1 | head -1`: what was computed is saved, and the exit code stays."""
     out = tmp_path / "out"
@@ -173,7 +173,7 @@ def test_every_command_tells_an_example_that_exists(every_command):
             assert not word.startswith("studies/") or (ROOT / word).exists() or word.endswith(("emps", "dfki")), line
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_new_files_serve_at_once(run):
     run("new", "campaign", "axis")
     words = []
@@ -184,7 +184,7 @@ def test_new_files_serve_at_once(run):
     assert (ran.code, ran.err) == (0, "")
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_a_campaign_is_read_moves_and_says_that_it_is_synthetic(run, tmp_path):
     made = run("new", "campaign", "my_axis")
     assert (made.code, made.out) == (0, "wrote my_axis; try: armid check my_axis\n")

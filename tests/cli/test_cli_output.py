@@ -57,7 +57,7 @@ def called(run, small_folder, store, tmp_path, monkeypatch):
     return all_of
 
 
-@pytest.mark.parametrize("lines", [CALLS, pytest.param(SLOW, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("lines", [CALLS, pytest.param(SLOW, marks=pytest.mark.nightly)])
 def test_no_table_is_wider_than_the_screen_and_nothing_in_it_is_cut(called, monkeypatch, lines):
     monkeypatch.setenv("COLUMNS", "80")
     for line, ran in called(lines):

@@ -40,7 +40,7 @@ def test_registered_things_keep_their_contract(kind, name, thing):
         assert {f.name.split(", ")[1] for f in found} == {"driven_axis in m/s", "driven_axis in rad/s"}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", [name for name, i in IDENTIFIERS.items() if i.package])
 def test_identifiers_of_other_libraries_keep_their_contract(name, monkeypatch):
     pytest.importorskip(IDENTIFIERS[name].package)
@@ -49,7 +49,7 @@ def test_identifiers_of_other_libraries_keep_their_contract(name, monkeypatch):
 
 
 # The effects in one compiled model of a plant, all but one at their nulls.
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("plant", [AXIS, ARM, PLANTS["flexible_link"]], ids=["axis", "arm", "link"])
 def test_every_effect_keeps_its_contract(plant):
     effects = tried_on(plant)

@@ -64,7 +64,7 @@ DECLARED = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_effects_miss_points_beside_others_that_keep_them():
     named = {f"own_{i}": pair for i, pair in enumerate((*BESIDE.items(), ("", drag)))}
     with np.errstate(all="ignore"):

@@ -147,7 +147,7 @@ def test_stable_steps_are_of_second_order_and_bear_fast_decays(n):
     assert [stages_as_stable_as(n) for n in (8, 32)] == [6, 12]
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("more", "share"),
     [((), 1e-4), (("drive_delay",), 1e-4), (("output_delay",), 1e-4), (("dead_zone",), 1e-4), (("backlash",), 1e-6)],

@@ -53,7 +53,7 @@ def listing(folder):
     return {str(p): (p.stat().st_size, p.stat().st_mtime_ns) for p in folder.rglob("*") if p.is_file()}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_second_process_compiles_nothing_and_damaged_code_is_compiled_again(tmp_path):
     """No other number, no traceback, whatever became of the files; and they are mended."""
     folder = tmp_path / "new" / "cache"

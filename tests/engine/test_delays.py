@@ -54,7 +54,7 @@ def solved(rate, start, ends, length):
     return past
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 @pytest.mark.parametrize("hold", ["zero", "linear"])
 def test_a_recorded_input_is_shifted_with_its_hold(hold):
     """Each lane has its own delays; neighbours change nothing."""
@@ -86,7 +86,7 @@ SPRING = Effect(
 )  # fmt: skip
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_a_computed_signal_comes_out_of_the_history_however_short_the_delay():
     model = Model(AXIS) + SPRING
     manoeuvre = Manoeuvre(STEP_S, N_SAMPLES, {"start_speed": 0.3, "start_position": 0.1}, {"u": DRIVE}, "zero")
@@ -114,7 +114,7 @@ def test_a_computed_signal_comes_out_of_the_history_however_short_the_delay():
     assert np.all(errors[4][[0, 1, 2, 4]] <= errors[2][[0, 1, 2, 4]] / 10.0)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("stroke", ["lower", "raise"])
 def test_a_late_control_moves_the_arm_as_on_the_test_stand(stroke, wide, manoeuvres):
     """Switches, kinks and samples that are repeated with finer steps, all with their past; beside a punctual lane."""
@@ -153,7 +153,7 @@ def test_a_piece_sees_what_drove_the_machine_before_it():
     np.testing.assert_array_equal(terms["drive_delay.late"], DRIVE[late])
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_what_is_late_of_a_late_signal_is_late_by_both():
     """The second effect delays a quantity that the first one makes late."""
     # The sensor adds what is late less what is there, of the effort of drive and effects.
@@ -200,7 +200,7 @@ def test_one_effect_under_two_names_is_looked_for_once():
     assert [e.form for e in (Model(PLANTS["shell_transfer_arm"]) + filters[0]).exact.effects] == ["feedback"]
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_the_voltage_of_a_plug_in_is_late_exactly_and_its_derivative_by_the_delay():
     """Where the voltage is held the signal bends in the delay at whole samples, and jumps nowhere."""
     model = Model(winch) + EFFECTS["viscous"] + EFFECTS["drive_delay"].in_form("voltage")
@@ -218,7 +218,7 @@ def test_the_voltage_of_a_plug_in_is_late_exactly_and_its_derivative_by_the_dela
     assert np.abs(slope - expected).max() <= 1e-3 * np.abs(expected).max()
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_a_mean_over_a_window_is_the_way_over_its_time():
     """Of a machine that moves before the start too; a window below a microsecond is taken in part."""
     model = Model(AXIS) + EFFECTS["viscous"] + EFFECTS["output_average"]

@@ -61,7 +61,7 @@ def test_what_is_integrated_in_place_of_powers_and_cosines_stays_equal_to_them(a
     assert np.abs(gas / gas[:, :1] - 1.0).max() <= 1e-8
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_random_candidates_agree_with_the_test_stand(arm, manoeuvres, schedule_for):
     candidates = drawn(arm, N_CANDIDATES, SEED)
     left = 0
@@ -77,7 +77,7 @@ def test_random_candidates_agree_with_the_test_stand(arm, manoeuvres, schedule_f
     assert left <= N_CANDIDATES // 20
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("width", [0.01, 0.001])
 def test_friction_agrees_with_the_test_stand(width, rubbing_arm, manoeuvres):
     """However narrow the smoothing of the sign: the schedule follows."""
@@ -145,7 +145,7 @@ THIRD_ON_STAND = {
 }  # fmt: skip
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(("k", "planted"), [(0, ON_STAND), (1, SECOND_ON_STAND), (2, THIRD_ON_STAND)])
 def test_effects_move_the_arm_as_on_the_test_stand(k, planted, arm, manoeuvres):
     """All effects, or all further forms, in one model that tests/contract compiles: one at its null adds nothing."""

@@ -85,7 +85,7 @@ def test_neighbours_threads_and_weights_change_no_bit(arm, manoeuvres, schedule)
         assert same(whole, slice(None), other)
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_a_diverged_candidate_is_nan_from_then_on_and_harms_no_other(manoeuvres, arm):
     pushed_arm = arm + EFFECTS["viscous"]
     calm = np.column_stack([drawn(pushed_arm, 20, 25)[:, :4], np.zeros(20)])

@@ -209,7 +209,7 @@ def test_what_cannot_be_written_down(function, sentence):
     refused(function, sentence)
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 @pytest.mark.parametrize(("function", "sentence"), COMPILED.values(), ids=COMPILED)
 def test_what_numba_cannot_compile(function, sentence):
     error = refused(function, sentence)

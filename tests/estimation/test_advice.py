@@ -159,7 +159,7 @@ def rivals(models, stroke):
     return [fitted(name, model, [record]) for name, model in models.items()]
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_a_louder_sensor_tells_less_apart_and_twins_nothing_does(rivals):
     (replay,) = rivals[0].records.replays
     repeated, *others = manoeuvre_grid(replay.model, [replay.record])
@@ -207,7 +207,7 @@ def test_the_largest_set_that_is_told_apart_is_named(rivals):
     )
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_advised_record_tells_apart_and_beats_a_random_one(models, stroke):
     """One stroke leaves friction open. Make the advised record, and a random one, 4 times: fit both rivals again."""
     rng = np.random.default_rng(7)

@@ -43,7 +43,7 @@ def minimum(fitness, replay, space):
     return found.draws[0]
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_least_squares_scatters_as_the_cramer_rao_bound_says(stroke, arm_space, monkeypatch):
     x = minimum(SQUARES, stroke, arm_space)
     information = information_at((stroke,), arm_space, x)
@@ -99,7 +99,7 @@ def test_where_the_minimum_is_a_plateau_the_estimates_scatter_over_it(stroke, ar
     assert apart[:, 1].max() > 1.0
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_without_convergence_or_noise_and_where_nothing_is_determined_there_is_no_interval(
     stroke, arm_space, monkeypatch
 ):  # fmt: skip

@@ -220,7 +220,7 @@ def test_a_clock_is_moved_by_a_time_and_not_by_samples(campaign):
     assert moved(records[1], 5.0).pieces[0] is records[1].pieces[0]
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", MISTAKES)
 def test_a_mistake_is_noticed_and_named(name, campaign):
     kind, made, words = MISTAKES[name]
@@ -245,7 +245,7 @@ PAIRS = ("lower,raise", "raise,short", "lower,empty,raise_empty")
 COMMITTED = ("four_strokes", "one_stroke", "rocking_shell", "table1_stand/row_5")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_right_campaigns_are_not_accused(root, stand, tmp_path):
     options = [("--effect", *effects.split()) for effects in LACKING] + [text.split(" ") for text in SENSORS]
     options += [("--holdout", "", "--seed", str(4100 + i), "--manoeuvres", PAIRS[i % len(PAIRS)],
@@ -269,7 +269,7 @@ def halves(folder, windows):
     return folder
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_a_long_record_is_simulated_whole_only_to_learn_how_few_samples_will_do(campaign, monkeypatch):
     """Most of its motion comes after the samples that the checks begin with, and it is seen all the same."""
     folder, n, steps = campaign("one"), 200_000, []

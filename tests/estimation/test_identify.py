@@ -31,7 +31,7 @@ ROOT = Path(__file__).parents[2]
 GOLDEN = ROOT / "tests" / "golden" / "paper_arm.json"
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_recovers_the_truth_of_an_independent_stand(stand, found):
     campaign = read_campaign(stand(*CLEAN, *OPTIONS, "--manoeuvres", "lower,raise,short,empty"))
     result = found(campaign, budget=12_000, fitness="rmse")
@@ -50,7 +50,7 @@ def test_finds_on_one_stroke_what_the_paper_found(stand, found):
     assert (np.median(errors, axis=0) <= PAPER).all()
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_the_holdout_never_enters(found, lowering):
     def with_other_holdout(record):
         rng = np.random.default_rng(1)
@@ -120,7 +120,7 @@ def golden_numbers(campaign, fitness):
     return {**parameters, "value": found.value, "train_rmse": found.train.rmse}
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_seed_1_finds_what_it_found(paper_arm):
     for fitness, numbers in json.loads(GOLDEN.read_text()).items():
         # other processors round differently, and swarms carry that on

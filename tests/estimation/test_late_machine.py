@@ -89,7 +89,7 @@ def test_a_dead_time_is_no_lag_and_a_lag_no_dead_time(fitted):
     assert left["dead time", "lag"] > 2.0 < left["lag", "dead time"]
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_an_estimate_does_not_stop_where_whole_samples_make_chi2_jump(tmp_path):
     """A current shows a late voltage at once: at a dead time of three samples chi2 is stepped, and not to be passed."""
     late, rng = 3, np.random.default_rng(6)

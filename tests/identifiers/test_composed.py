@@ -174,7 +174,7 @@ CLEAN = ("--noise-deg-s", "0", "--quantisation-deg-s", "0", "--repeats", "1", "-
          "--duration", "0.7")  # fmt: skip
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("truth", ROWS.values(), ids=ROWS)
 @pytest.mark.parametrize("name", ["least_squares", "pso+least_squares"])
 def test_all_four_within_a_millionth_of_the_truth(stand, arm, truth, name):

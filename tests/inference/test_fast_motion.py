@@ -92,6 +92,7 @@ def campaign(folder, records, gain):
     return read_campaign(write_records(folder, HEAD.format(gain=gain, tolerance=TOLERANCE), records, holdout=0))
 
 
+@pytest.mark.nightly
 def test_force_mass_and_friction_that_grow_alike_are_not_told_apart_by_sharp_friction(tmp_path):
     rng = np.random.default_rng(2)
     records = {f"r{i}.csv": table for i, table in enumerate(tables(rng))}
@@ -109,6 +110,7 @@ def test_force_mass_and_friction_that_grow_alike_are_not_told_apart_by_sharp_fri
         assert estimate.low < truth < estimate.high
 
 
+@pytest.mark.nightly
 def test_form_and_width_of_declared_friction_are_fitted_and_no_other_effect_stands_in_for_them(tmp_path):
     rng, toml = np.random.default_rng(8), 'name = "axis"\nplant = "driven_axis"\nhold = "zero"\neffects = ["coulomb"]\n'
     records = {f"r{i}.csv": table for i, table in enumerate(tables(rng))}

@@ -61,7 +61,7 @@ def test_another_form_of_an_effect_takes_its_place(explored):
     assert found.probabilities["effects"]["flux_saturation"] > 0.95
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_wave_needs_five_periods_within_the_travel(stand):
     campaign = read_campaign(stand(*MANOEUVRES))
     library, declared = prepared(Model(campaign.plant), campaign, {n: EFFECTS[n] for n in FEW})

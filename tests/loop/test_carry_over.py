@@ -41,6 +41,7 @@ def closed(folder, n_held=1, **held):
     return armid.close_loop(campaign, candidates=["torque_offset"], curve=False)
 
 
+@pytest.mark.nightly
 def test_a_record_of_more_drive_than_any_train_record(tmp_path):
     found = closed(tmp_path, amplitude=4.0, most=2.0)
     assert found.verdict == "does_not_carry_over"

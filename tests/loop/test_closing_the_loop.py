@@ -84,6 +84,7 @@ def test_missing_effect_is_named_and_the_parameters_come_right(closed):
     assert plain["chi2_per_sample"] > 1.5 > log[0]["chi2_per_sample"]
 
 
+@pytest.mark.nightly
 def test_effects_that_leave_the_same_trace_are_one_group_and_get_advice(closed):
     found = closed("coulomb=40")
     assert (found.verdict, found.also) == ("cannot_tell_apart", ())

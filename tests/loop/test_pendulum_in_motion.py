@@ -79,7 +79,7 @@ def test_a_pendulum_that_goes_over_the_top_is_estimated_from_the_beginning_of_it
     assert declared.x == pytest.approx([INERTIA, GRAVITY_MOMENT, 0.01], rel=1e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_its_drive_lacks_is_found_on_short_pieces_of_its_records(tmp_path):
     """Over a whole record the motion without it has nothing in common with what was measured."""
     rng, messages = np.random.default_rng(2), []

@@ -124,6 +124,7 @@ def test_a_parameter_that_rises_from_record_to_record_is_told(stand, campaign):
         assert e.low < TRUTH[e.name] < e.high
 
 
+@pytest.mark.nightly
 def test_a_large_change_in_one_record_is_undone_as_a_motion_answers_to_it(tmp_path):
     """A joint that swings far: what a change does depends on all other parameters."""
     rng, times, tables = np.random.default_rng(5), 0.004 * np.arange(1000), {}
@@ -148,6 +149,7 @@ def test_a_large_change_in_one_record_is_undone_as_a_motion_answers_to_it(tmp_pa
         assert estimate.low < truth[estimate.name] < estimate.high
 
 
+@pytest.mark.nightly
 def test_a_record_that_is_late_by_a_part_of_a_sample_bends_where_its_input_jumps(tmp_path):
     """Between samples nobody knows a speed that bends: the input comes later, by its mean over each interval."""
     rng, late, fine, tables = np.random.default_rng(62), 0.0037, 0.0001, {}
@@ -217,6 +219,7 @@ def stage():
     )  # fmt: skip
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("late", [0.0004, -0.0017])
 def test_a_late_record_whose_current_jumps_with_the_voltage(tmp_path, late):
     """What follows an input at once is moved with it, as the other records tell."""
@@ -244,6 +247,7 @@ def test_a_late_record_whose_current_jumps_with_the_voltage(tmp_path, late):
         assert estimate.value == pytest.approx(value, rel=2e-3)
 
 
+@pytest.mark.nightly
 def test_a_parameter_that_is_another_in_one_record_is_told(stand, campaign):
     options = list(COMMON)
     options[options.index("--p0") + 1] = repr(1.03 * TRUTH["p0"])

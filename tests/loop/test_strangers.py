@@ -94,6 +94,7 @@ def campaign(folder, plant, records):
     return read_campaign(write_records(folder, head, files), {plant.name: plant})
 
 
+@pytest.mark.nightly
 def test_an_encoder_that_is_fine_for_its_travel_and_coarse_for_its_noise(tmp_path):
     """Its rest shows less noise than its motion; the samples beyond the end of a late file are guessed."""
     records = campaign(tmp_path, CARRIAGE, carriage_records(np.random.default_rng(21), LATE_S))
@@ -149,6 +150,7 @@ def disc_records(rng, n_records, n_steps, n_rest):
         yield {"time_s": 0.01 * np.arange(len(voltage)), "voltage_V": voltage, "angular_velocity_rad_s": speed}
 
 
+@pytest.mark.nightly
 def test_what_the_added_effect_cannot_be_told_apart_from_widens_its_own_strength_too(tmp_path):
     """The slope that is not declared makes up for all others exactly; a fit with it may not end worse than without."""
     declared = campaign(tmp_path, DISC, disc_records(np.random.default_rng(23), 3, 12, 60))
@@ -197,6 +199,7 @@ def dragged(folder, sensor, n_steps):
     return close_loop(records.model(), records, {name: EFFECTS[name] for name in names})
 
 
+@pytest.mark.nightly
 def test_what_a_simulation_without_noise_errs_is_nothing_that_the_machine_lacks(tmp_path):
     found = dragged(tmp_path, lambda motion, rng: motion[:, 1], 1)
     assert found.verdict == "explained"
@@ -206,6 +209,7 @@ def test_what_a_simulation_without_noise_errs_is_nothing_that_the_machine_lacks(
     assert found.after.holdout.errors.chi2_per_sample is None
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("sensor", [by_reading, from_counts])
 def test_noise_that_no_rest_tells_is_nothing_that_the_machine_lacks(tmp_path, sensor):
     found = dragged(tmp_path, sensor, 4)
@@ -241,6 +245,7 @@ def test_a_speed_that_is_counted_over_a_window_is_told_from_one_that_is_late_and
         assert estimates[name].low < truth < estimates[name].high
 
 
+@pytest.mark.nightly
 def test_effects_that_show_only_beside_each_other_are_found(tmp_path):
     """A cart that never stands still: each of the three alone explains next to nothing."""
     rng, drive, late = np.random.default_rng(5), np.repeat([20.0, 40.0, 60.0, 80.0, 100.0], 100), 2
@@ -265,6 +270,7 @@ damping = { low = 0.0, high = 10.0 }
 """
 
 
+@pytest.mark.nightly
 def test_sticks_of_a_coarse_encoder_tell_of_dry_friction(tmp_path):
     rng, interval, n, step = np.random.default_rng(7), 0.01, 1300, 2.0 * np.pi / 4096
     tables = {}

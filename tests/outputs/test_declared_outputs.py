@@ -22,7 +22,7 @@ START = np.array([0.1, 0.5, 0.05, 0.4])
 STARTS = dict(zip(("start_motor", "start_motor_speed", "start_load", "start_load_speed"), START, strict=True))
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_one_simulation_gives_all_outputs_as_scipy_does_and_loses_all_where_it_diverges():
     u = drive(400, 1.0)
     run = simulate(Model(two_inertias), Manoeuvre(INTERVAL, 400, STARTS, {"u": u}), list(TRUTH.values()), Schedule(8))
@@ -60,7 +60,7 @@ def test_the_old_way_declares_one_output_and_a_wrong_one_is_refused():
         replace(two_inertias, outputs=two_inertias.outputs[:1] * 2)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_sensor_has_effects_at_the_port_of_its_output():
     found = sensor_effects(two_inertias)
     assert list(found) == ["load_angle_bias", "load_angle_scale", "load_angle_delay", "load_angle_lag"]

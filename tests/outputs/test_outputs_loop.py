@@ -29,6 +29,7 @@ def closed(tmp_path_factory):
     return close_loop(campaign.model(), campaign, {**wanted, **sensor_effects(campaign.plant)})
 
 
+@pytest.mark.nightly
 def test_the_missing_friction_is_named_the_rest_is_noise_and_the_start_held_out_does_not_judge(closed):
     """The bias of the load's angle is none: a start that is fitted makes up for all of it."""
     assert (closed.verdict, closed.effects) == ("explained", ("coulomb",))
@@ -91,6 +92,7 @@ def test_where_nothing_is_missing_no_sensor_is_accused(sound):
         assert abs(TRUTH[e.name] - e.value) < 1.5 * (e.high - e.low) / 2.0
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("file", "kind", "value", "alone"), [
     ("a.csv", "gain", 0.03, False), ("a.csv", "late", 0.015, True),
 ])  # fmt: skip

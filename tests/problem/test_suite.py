@@ -34,7 +34,7 @@ def test_values_at_stored_points():
     assert [name for name in OF_THE_ARM if not is_as_stored(name)] == []
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", [name for name in STORED if name not in OF_THE_ARM])
 def test_values_at_stored_points_of_other_machines(name):
     """Nearly each compiles a model of its own, which two processes may share out."""

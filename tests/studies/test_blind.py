@@ -74,7 +74,7 @@ def test_the_suite_holds_what_the_question_asks_and_a_part_the_campaigns_of_the_
     assert sorted(whole) == list(range(len(cases))) != whole
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_suite_is_the_same_from_one_process_or_two(small, tmp_path):
     again = tmp_path / "suite"
     assert main([str(again), *words_of(small.with_name("small.toml")), "--processes", "2"]) == 0
@@ -83,7 +83,7 @@ def test_a_suite_is_the_same_from_one_process_or_two(small, tmp_path):
     assert key_path(again).read_bytes() == key_path(small).read_bytes()
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_a_campaign_tells_nothing_of_its_truth_and_the_package_reads_it(small):
     words = re.compile(r"effect|seed|true|noise|colou?r|white|p0|eta3|bias|class|index|key", re.IGNORECASE)
     assert sorted(each.name for each in small.iterdir()) == sorted(key_of(small)["campaigns"])
@@ -132,7 +132,7 @@ def test_what_effects_do_is_told_for_each_campaign(small):
             assert entry["declared_fit"] is None
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 @pytest.mark.parametrize("name", KNOWN)
 def test_lanes_agree_with_the_stand(name):
     pairs = [(Arm(), KNOWN[name]), (Arm(3.2e6, 0.9, 0.6, 1.2), KNOWN[name])]

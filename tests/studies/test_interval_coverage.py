@@ -23,7 +23,7 @@ def test_coverage_width_and_bias_are_those_of_the_intervals_that_are_given():
     assert found["bias"] == pytest.approx(0.0, abs=0.06)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_two_noises_of_a_machine_and_its_twin(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(interval_coverage, "arm", lambda: axis()._replace(name="twin"))
     monkeypatch.setattr(interval_coverage, "FITNESSES", {name: FITNESSES[name] for name in ("rmse", "minimax")})

@@ -53,7 +53,7 @@ def form_of(family, form):
     return next(f for f in FORMS if (f.family, f.form) == (family, form))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", MACHINES)
 def test_simulator_and_engine_agree_on_every_plain_machine(name):
     for hold, tolerance in (("zero", 2e-6), ("linear", 1e-5)):
@@ -85,7 +85,7 @@ LISTED = (
 )  # fmt: skip
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize(("name", "family", "form", "sizes", "effect", "values"), LISTED)
 def test_a_form_that_the_library_holds_is_its_form(name, family, form, sizes, effect, values):
     plant = OF_NAME[name]
@@ -146,7 +146,7 @@ def every_machine(tmp_path_factory):
     return folder, json.loads(folder.with_name("all.key.json").read_text())
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_campaigns_are_the_same_for_the_same_seed_also_after_a_cut(every_machine, tmp_path):
     folder, key = every_machine
     again, last = tmp_path / "all", list(key["campaigns"])[-1]
@@ -177,7 +177,7 @@ def test_armid_reads_a_campaign_of_every_machine_and_the_key_holds_its_truth(eve
         assert set(entry["parameters"]) == {p.name for p in campaign.plant.parameters}
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_noise_in_a_record_is_what_the_key_says():
     planned, rng = plan(12, 0, ["hydraulic_boom"])
     campaign = drawn(planned, rng)

@@ -41,7 +41,7 @@ def states(count=200):
     ({"base_compliance": 1e-4, "base_hz": 1e-3}, {}),
     ({"drive_compliance": 5e-11, "drive_damping": 3e5}, {}),
 ], ids=lambda told: next(iter(told), "declared"))  # fmt: skip
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_two_ways_to_say_the_same_agree(one, other, name):
     assert np.abs(moved(Effects(**one), name).gyro - moved(Effects(**other), name).gyro).max() < 1e-5
 

@@ -26,7 +26,7 @@ def test_the_guide_has_an_example_of_every_library_in_about_ten_lines(blocks):
         assert len([line for line in found.splitlines() if line.strip()]) <= 12
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("package", PACKAGES)
 def test_examples_run(package, blocks, tmp_path):
     pytest.importorskip(package)
@@ -36,7 +36,7 @@ def test_examples_run(package, blocks, tmp_path):
     assert done.stdout.strip()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_foreign_optimiser_is_compared_by_one_command(blocks, root, tmp_path):
     (mine,) = [b for b in blocks if b.startswith("# mine.py")]
     (tmp_path / "mine.py").write_text(mine, encoding="utf-8")
@@ -65,7 +65,7 @@ def last_errors(cell):
     return [float(number) for number in re.findall(r"([\d.]+)%", text)]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.filterwarnings("default")
 def test_the_notebook_runs(root, tmp_path):
     nbclient = pytest.importorskip("nbclient", reason="nbclient is not installed: pip install -e '.[notebook]'")

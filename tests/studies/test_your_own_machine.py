@@ -41,7 +41,7 @@ def test_the_plant_keeps_the_contract(plugin):
     assert [f"{f.name}: {f.sentence}" for f in check_thing("plants", "boom", plant) if not f.passed] == []
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_late_voltage_is_no_late_torque(folder, plugin):
     """Told as one, for want of a port at the winding, it would give another inertia, of which nobody may be sure."""
     boom = load_registry([plugin]).plants["boom"]
@@ -89,7 +89,7 @@ def test_what_is_read(folder, plugin):
     assert np.sum(on) * off.manoeuvre.interval == pytest.approx(rows["time_s"][rows["drive_on"] == 0][0], abs=2e-5)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_right_effects_find_the_truth_and_without_them_the_answer_is_wrong(capsys, folder, plugin, tmp_path):
     def identified(effects):
         out = tmp_path / f"with {effects}"
@@ -111,7 +111,7 @@ def test_the_right_effects_find_the_truth_and_without_them_the_answer_is_wrong(c
     assert "the model lacks something" in capsys.readouterr().out
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_loop_finds_both_and_no_more(folder, plugin, tmp_path):
     words = ("--threads", "1", "--out", tmp_path, "--candidates", "load_friction,output_lag,viscous")
     assert ended("close-loop", folder / "campaign", "--plugin", plugin, *words) == 0

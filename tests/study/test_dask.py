@@ -44,7 +44,7 @@ def cluster(tmp_path):
         process.wait()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_dask_cluster_that_loses_a_worker(cluster, start, write_study, tmp_path, undisturbed):
     address, workers = cluster
     out = tmp_path / "out"

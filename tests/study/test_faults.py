@@ -42,7 +42,7 @@ def ended_with_one_sentence(process):
     return err
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_full_disk_is_told_and_harms_nothing(start, write_study, tmp_path, small_disk, undisturbed):
     file, out = write_study(SEEDS), small_disk / "out"
 
@@ -75,7 +75,7 @@ def test_a_full_disk_is_told_and_harms_nothing(start, write_study, tmp_path, sma
     assert same_results(load_study(out), undisturbed)
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_a_read_only_folder_can_be_read_and_is_told_when_written(write_study, small_disk, undisturbed):
     remount(small_disk, "size=20m")
     shutil.copytree(undisturbed.path.parent, small_disk / "out")
@@ -102,7 +102,7 @@ def test_a_log_left_in_a_read_only_folder_is_read(write_study, small_disk):
     assert len(load_study(out).runs) == n > 0
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_identifiers_that_misbehave_fail_alone(write_study, tmp_path, bad_identifiers, undisturbed):
     """Each with its error, and the other runs are what they were."""
     errors = {
@@ -150,7 +150,7 @@ def test_a_damaged_page_is_told(undisturbed, tmp_path):
             load_study(tmp_path)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_failed_runs_are_made_anew_on_request_and_when_the_plug_in_has_changed(write_study, tmp_path, bad_identifiers):
     mine = tmp_path / "mine.py"
     shutil.copy(bad_identifiers, mine)
@@ -195,7 +195,7 @@ def test_a_worker_that_cannot_start_is_told(write_study, tmp_path, monkeypatch):
         run_study(write_study(), jobs=1, out=tmp_path / "out")
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_a_script_without_a_main_guard_runs_a_study(write_study, tmp_path):
     script = tmp_path / "script.py"
     called = f"run_study({str(write_study(1))!r}, 1, out={str(tmp_path / 'out')!r}, only='row 1/random')"

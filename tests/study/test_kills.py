@@ -38,7 +38,7 @@ def ended_well(process):
     return out
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_runner_killed_again_and_again(start, write_study, tmp_path, undisturbed):
     """After many kills nearly every run is finished, and none hits a runner at work."""
     file, out, rng, cut = write_study(SEEDS), tmp_path / "out", random.Random(2), 0
@@ -110,7 +110,7 @@ def test_an_interrupt_of_the_workers_cuts_no_run(start, write_study, tmp_path, u
     assert same_results(load_study(tmp_path / "out"), undisturbed)
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_ctrl_c_keeps_what_is_finished_and_says_how_to_go_on(start, write_study, tmp_path):
     process = start(write_study(60), "--out", tmp_path / "out", "--jobs", 2)
     wait_for(process, tmp_path / "out", 3)

@@ -15,7 +15,7 @@ from armid.study.results import load_study
 from armid.study.runner import run_study
 from commands import ended, python
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.nightly
 ROOT = Path(__file__).parents[2]
 
 

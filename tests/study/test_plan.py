@@ -49,7 +49,7 @@ def test_every_combination_is_there_once_and_random_truths_are_a_latin_hypercube
         assert sorted(((shares - 0.1) / 0.8 * 20).astype(int)) == list(range(20))
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_without_a_folder_results_go_where_git_ignores_them_and_names_of_tables_choose_runs(
     write_study, tmp_path, monkeypatch
 ):
@@ -101,7 +101,7 @@ def test_simulated_records_agree_with_an_independent_integrator(stand, write_stu
     assert np.abs(np.rad2deg(ours) - theirs).max() < 0.6e-6
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_a_changed_file_keeps_what_it_still_asks_for(write_study, tmp_path):
     told = {"jobs": 1, "out": tmp_path / "out", "only": "row 1/random"}
     first = run_study(write_study(2), **told)

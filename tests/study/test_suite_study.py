@@ -146,7 +146,7 @@ def area_of(entry, options, cases, seed):
     return np.mean(areas)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_tuning_that_was_interrupted_ends_as_one_that_was_not(written, tmp_path, watched, capsys):
     pytest.importorskip("optuna")
     file, whole, broken = written(**SMALL), tmp_path / "whole", tmp_path / "broken"
