@@ -115,7 +115,7 @@ def held(folder, seed=4):
     return read_campaign(write_records(folder, HEAD.format('["torque_offset"]'), tables))
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_no_fit_of_a_start_takes_up_what_noise_of_an_input_does_later(tmp_path):
     """Such a fit takes the noise as white, and would move the whole record: what is left looks like an offset."""
     read = held(tmp_path / "held")
@@ -130,7 +130,7 @@ def test_no_fit_of_a_start_takes_up_what_noise_of_an_input_does_later(tmp_path):
         assert moved[0] < 1e-3 * moved[-1]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_load_that_a_controller_holds_lacks_nothing(tmp_path):
     """What the noise does to the whole record is no offset of the torque."""
     found = close_loop(held(tmp_path / "held"), candidates=["coulomb", "stribeck"])
@@ -155,7 +155,7 @@ def test_how_far_it_moves_the_model_and_that_this_may_be_all_that_remains(tmp_pa
     assert "inputs" not in " ".join(answer(result_of(without), details_of(without)))
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 @pytest.mark.parametrize("measured", [noisy, exact])
 def test_an_interval_holds_what_noise_of_an_input_does_where_fitted_starts_and_the_sensor_hide_it(tmp_path, measured):
     inside, alone = [], []
@@ -178,6 +178,18 @@ def test_an_interval_holds_what_noise_of_an_input_does_where_fitted_starts_and_t
         assert ("Noise of the inputs moves" in text) == (measured is noisy)
     assert sum(inside) >= 7
     assert (sum(alone) <= 5) == (measured is noisy)
+
+
+@pytest.mark.parametrize("share", [1.0, 0.2])
+def test_noise_that_the_records_deny_widens_no_interval(tmp_path, share):
+    """What a controller computes of a noisy speed looks as if it were measured with noise, and is exact.
+
+    With a share of 0.2 the sensors see less of it than of their own noise.
+    """
+    read = [campaign(tmp_path / one.__name__, one, computed) for one in (exact, noisy)]
+    there, gone = (identify(as_if_noisy(r, share * TORQUE_NOISE)) for r in read[::-1])
+    assert there.by_inputs.any()
+    assert not gone.by_inputs.any()
 
 
 INPUTS = {
@@ -239,7 +251,7 @@ def test_the_covariance_of_its_error_is_that_of_drawn_columns(step):
     assert covariance[0, 0] == pytest.approx(least[0], rel=0.25)
 
 
-@pytest.mark.slow(traced=True)
+@pytest.mark.slow
 def test_what_a_right_model_leaves_is_turned_white(tmp_path):
     """Of many torques with noise on the same motion; whitened, the misfit of the true model is noise."""
     chi2, lags = [], []
@@ -255,7 +267,7 @@ def test_what_a_right_model_leaves_is_turned_white(tmp_path):
     assert abs(np.mean(lags)) < 0.03
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_friction_is_found_beside_it_and_judged_by_the_model_that_the_loop_ends_with(tmp_path):
     """That model has other parameters than the declared one. A sound machine lacks nothing."""
     records = campaign(tmp_path / "axis", noisy)
@@ -282,9 +294,9 @@ def computed(seed):
     return torque(seed + 200) + np.random.default_rng(seed + 200).normal(0.0, TORQUE_NOISE, len(TIMES))
 
 
-def as_if_noisy(read):
+def as_if_noisy(read, rms=TORQUE_NOISE):
     """Return a campaign whose inputs look as if they were measured with noise."""
-    noise = {"u": InputNoise(rms=TORQUE_NOISE)}
+    noise = {"u": InputNoise(rms=rms)}
     return replace(read, records=tuple(replace(r, input_noise=noise) for r in read.records))
 
 

@@ -14,13 +14,14 @@ from armid.estimation.noise_model import Level, known_level, level_of, level_wei
 from armid.model import Array
 from armid.problem.problem import Replay, by_record, samples_of
 from armid.problem.space import Space
-from armid.report.document import LEFT_OF_MOVED
 
 NORMAL_95 = 1.959963984540054
 # Directions whose information is below this share of the strongest is rounding.
 SINGULAR = 1e-13
 # Parameters of a larger correlation than this are hardly separated.
 CORRELATED = 0.95
+# Log odds of noise of the inputs below which they were exact: 1 to 20.
+ODDS_OF_EXACT = -3.0
 
 
 @dataclass(frozen=True)
@@ -194,8 +195,10 @@ def start_changes(records: LeastSquaresProblem, z: Array, bent: bool = False) ->
 def covariance_by_inputs(replays: tuple[Replay, ...], space: Space, x: Array) -> Array:
     """Return the covariance of an estimate by noise of the inputs, SI, (n_free, n_free).
 
-    To first order, with the starts that are fitted. 0 where all inputs are commands, and where what is left is too
-    small to hold such noise: the inputs are then commands.
+    To first order, with the starts that are fitted. 0 where all inputs are commands, and where what is left denies such
+    noise: the inputs are then commands. With answers W, as parameters leave them, and what is left r the odds are
+
+        log N(r; 0, I + W W^T) - log N(r; 0, I) = (r^T W (I + W^T W)^-1 W^T r - log det(I + W^T W)) / 2
     """
     noise, levels = pooled_noise([ready.record for ready in by_record(replays)]), list(map(known_level, replays))
     if not noise or any(level.rms == 0.0 for level in levels):
@@ -205,7 +208,7 @@ def covariance_by_inputs(replays: tuple[Replay, ...], space: Space, x: Array) ->
     residual, jacobian = records.residual_and_slopes(z)
     covariance = inverse(jacobian.T @ jacobian)
     covariance = np.where(np.isfinite(covariance), covariance, 0.0)
-    moved, left, lengths = np.zeros((len(x), len(x))), 0.0, [r.record.n_samples for r in replays]
+    moved, log_odds, lengths = np.zeros((len(x), len(x))), 0.0, [r.record.n_samples for r in replays]
     begins = dict(zip(replays, np.cumsum(lengths) - lengths, strict=True))
     weights = dict(zip(replays, records.weights, strict=True))
     for ready, outputs in by_record(replays).items():
@@ -218,9 +221,10 @@ def covariance_by_inputs(replays: tuple[Replay, ...], space: Space, x: Array) ->
             slopes = jacobian[rows].T @ changes
             shifts = covariance @ slopes
             moved += shifts @ shifts.T
-            left += float(np.sum(changes**2) - np.sum(slopes * shifts)) / len(residual)
-    shows = np.mean(residual**2) > 1.0 + LEFT_OF_MOVED**2 * left
-    return moved * np.outer(records.span, records.span) if shows or left < 1.0 else np.zeros((len(x), len(x)))
+            along = residual[rows] @ changes
+            widened = np.eye(changes.shape[1]) + changes.T @ changes - slopes.T @ shifts
+            log_odds += 0.5 * float(along @ np.linalg.solve(widened, along) - np.linalg.slogdet(widened)[1])
+    return moved * np.outer(records.span, records.span) if log_odds > ODDS_OF_EXACT else np.zeros((len(x), len(x)))
 
 
 def inverse(matrix: Array) -> Array:

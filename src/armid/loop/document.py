@@ -263,9 +263,9 @@ def parameter_table(report: Mapping[str, Any]) -> Table:
     rows = [(name, value_text(p, struck=True), text_of_noise_alone(p), trust_text(p),
              value_text(before[name], struck=True) if name in before else "") for name, p in after.items()]  # fmt: skip
     note = (
-        "95 % intervals count all models that were fitted; those of noise alone, which `identify` gives too, take the "
-        "model in force as true. Struck through (~ ~): do not rely on it, as something is missing, or the value rests "
-        "at its bound."
+        "95 % intervals count all models that were fitted; those of noise alone take the model in force as true, with "
+        "constants as they were fitted (`identify` takes them as declared). Struck through (~ ~): do not rely on it, "
+        "as something is missing, or the value rests at its bound."
     )
     return table("Parameters", ["parameter", "after", "of noise alone", "trusted", "before"], rows, note)
 
