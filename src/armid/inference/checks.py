@@ -481,6 +481,7 @@ def band_tests(seen: Residuals) -> Iterator[Finding]:
     shapes = {band: float(np.mean([np.mean(one[band]) for one in drawn])) if drawn else 1.0 for band in left}
     if not seen.data.sized:  # a sensor that rounds is not the only noise
         shapes = {band: max(shape / mean, 1.0) for band, shape in shapes.items()}
+    highest = max(0.5 / record.spacing for record in seen.data.each)
     for band, values in sorted(left.items()):
         other = rests.get(band, [])
         if coloured and len(other) < FEWEST_ORDINATES:
@@ -488,8 +489,7 @@ def band_tests(seen: Residuals) -> Iterator[Finding]:
         against = float(np.mean(other)) if coloured else flat * shapes[band]
         ratio, free = float(np.mean(values)) / against, 2.0 * INDEPENDENT * len(values)
         known = 2.0 * INDEPENDENT * len(other) if coloured else seen.data.n_noise(otherwise=np.inf)
-        high = BANDS_HZ[band + 1]
-        where = f"{BANDS_HZ[band]:g} to {high:g} Hz" if np.isfinite(high) else f"above {BANDS_HZ[band]:g} Hz"
+        where = f"{BANDS_HZ[band]:g} to {min(BANDS_HZ[band + 1], highest):.3g} Hz"
         yield Finding("frequency", where, ratio, chance(ratio, free, known))
 
 

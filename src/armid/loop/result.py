@@ -40,8 +40,10 @@ INSTEAD = "a constant without a tolerance may be off instead"
 NO_DATA = {"gap": "bridged over a gap", "clipped": "clipped", "stuck": "repeated", "spikes": "spikes"}
 OFF_BY = {
     "start": "starts elsewhere than declared, by", "offset": "its sensor is off by", "gain": "its gain is off by",
-    "drift": "its sensor drifts by", "clock": "its clock is fast by a share of",
+    "drift": "its sensor drifts by", "clock": "its clock is fast by",
 }  # fmt: skip
+# Sizes that are shares of what the file tells.
+SHARES = ("gain", "clock")
 Verdict = Literal[
     "implausible_records", "record_disagrees", "does_not_carry_over", "no_discrepancy", "explained", "partly_explained",
     "unexplained", "cannot_tell_apart",
@@ -456,7 +458,7 @@ def along(value: float, low: float, high: float) -> tuple[float, float]:
 
 
 def fault_sentence(s: RecordFault) -> str:
-    factor, name = shown(1.0, s.unit)
+    factor, name = (100.0, "%") if s.kind in SHARES else shown(1.0, s.unit)
     unit = behind(name)
     if s.kind in NO_DATA:
         return (f"{s.record}: {s.value:.0f} samples are {NO_DATA[s.kind]}, from {s.from_s:.4g} to {s.to_s:.4g} s: they "

@@ -224,8 +224,9 @@ def check_lost(table: CsvTable, header: str, faults: Sequence[Broken], n_new: in
     if n > most * n_new:
         worst = max(faults, key=lambda fault: fault.count)
         raise ArmidError(f"{table.file}, line {worst.line}: {n / n_new:.1%} of the samples of {header} are no data, "
-                         f"most of them {BROKEN_WORDS[worst.kind]}: at most {most:.0%} are expected, in a new "
-                         "recording or with another most_lost of the record")  # fmt: skip
+                         f"most of them {BROKEN_WORDS[worst.kind]}: at most {most:.0%} are expected, under its own "
+                         "header (a held input looks so under that of a sensor), in a new recording, or with another "
+                         "most_lost of the record")  # fmt: skip
 
 
 def gaps(times: Array, timing: Timing) -> list[Broken]:
