@@ -41,7 +41,7 @@ def test_figures_for_a_paper_are_pdf_of_its_width_without_a_title(store, monkeyp
     assert b"CreationDate" not in text
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_report_of_a_real_store(store):
     before = (store / "study.sqlite").read_bytes()
     assert ended("report", store) == 0

@@ -49,7 +49,7 @@ def drawn(results):
     return {part.name for part in (*document.tables, *document.figures)}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_page_has_every_file_table_and_figure_and_tells_what_it_is_made_of(table1_report):
     folder, names = table1_report
     assert sorted(p.name for p in folder.iterdir()) == sorted(names)

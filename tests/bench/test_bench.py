@@ -79,7 +79,7 @@ def test_engine_scipy_and_plain_loop_are_measured_with_their_errors():
     assert [r.wanted.number for r in (scipy, plain)] == [2000, 12]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_effects_are_measured_on_candidates_that_reach_their_switch():
     row = effects_row(rounds=1, n_candidates=16)
     assert_measured(row)
@@ -123,7 +123,7 @@ def test_start_up_calls_the_command_and_says_why_it_failed(tmp_path, monkeypatch
         startup_row(rounds=1, command=command, n_samples=60)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_large_campaigns_are_identified_in_memory_that_is_told():
     long, many = scale_rows(20_000, 10)
     assert (long.what, many.what) == ("identify, 20,000 samples", "identify, 10 records")

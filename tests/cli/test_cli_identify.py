@@ -41,7 +41,7 @@ def test_prints_tables_and_remarks_in_units_that_people_read(run, paper_arm_fold
     assert max(len(line) for line in ran.out.splitlines() if "│" in line) <= 80
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_writes_result_and_figures_the_same_bits_in_another_process(identified, small_folder, tmp_path):
     text, result = identified("--seed", "7")
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [

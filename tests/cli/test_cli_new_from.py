@@ -98,7 +98,7 @@ def test_times_of_day_in_some_files_alone_are_refused(refused, tmp_path):
         assert f"line 1: 'Time' holds {words}, as in the first file" in sentence
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_drive_that_never_changes_is_asked_about(run, tmp_path):
     times, _, speed, _ = wheel(5)
     write(tmp_path / "motor.csv", "time_s,drive_V,angular_velocity_rad_s", times, np.full(N, 3.0), speed)

@@ -81,7 +81,7 @@ def test_a_number_is_whole_or_not_there(width):
     print_table(empty, console)
 
 
-@pytest.mark.parametrize("lines", [CALLS, pytest.param(SLOW, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("lines", [CALLS, pytest.param(SLOW, marks=pytest.mark.nightly)])
 def test_json_is_one_object_and_quiet_prints_nothing(called, lines):
     for line, ran in called(lines, "--json"):
         assert ran.code == 0, line

@@ -54,7 +54,7 @@ def solved(rate, start, ends, length):
     return past
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("hold", ["zero", "linear"])
 def test_a_recorded_input_is_shifted_with_its_hold(hold):
     """Each lane has its own delays; neighbours change nothing."""
@@ -86,7 +86,7 @@ SPRING = Effect(
 )  # fmt: skip
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_computed_signal_comes_out_of_the_history_however_short_the_delay():
     model = Model(AXIS) + SPRING
     manoeuvre = Manoeuvre(STEP_S, N_SAMPLES, {"start_speed": 0.3, "start_position": 0.1}, {"u": DRIVE}, "zero")

@@ -200,7 +200,7 @@ def using(wide, plain, name, share=0.3):
     return np.array(list(values.values()))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_small_model_evaluates_every_effect_and_the_motion_is_that_without_what_is_inactive(
     arm, wide, rubbing_arm, manoeuvres, unweighted
 ):

@@ -269,7 +269,7 @@ def halves(folder, windows):
     return folder
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_long_record_is_simulated_whole_only_to_learn_how_few_samples_will_do(campaign, monkeypatch):
     """Most of its motion comes after the samples that the checks begin with, and it is seen all the same."""
     folder, n, steps = campaign("one"), 200_000, []

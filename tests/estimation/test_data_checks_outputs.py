@@ -64,7 +64,7 @@ RIGHT = {
     "link, all": partial(write_link, friction=0.3, outputs=("hub_angle_deg", "hub_speed_deg_s", "deflection_deg",
                                                                 "deflection_speed_deg_s"), noise=2.0),
 }  # fmt: skip
-QUICK = {"of two, speed inverted": (), **dict.fromkeys(("exchanged", "drive late", "mm"), pytest.mark.slow)}
+QUICK = {"of two, speed inverted": (), "mm": pytest.mark.slow}
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=QUICK.get(n, pytest.mark.nightly)) for n in MISTAKES])
@@ -98,7 +98,7 @@ def test_records_that_all_begin_elsewhere_than_the_model_are_told(tmp_path, begi
         assert re.match(r"angle: every train record begins -11\.\d to -11\.\d deg away from where rotary_arm", sentence)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_range_of_the_plant_that_is_too_narrow_accuses_no_record_and_widens(tmp_path):
     """It is a multiple of the machine's scales: a size to expect, and no limit."""
     read = read_campaign(write_link(tmp_path / "campaign"))

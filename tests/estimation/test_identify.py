@@ -120,7 +120,7 @@ def golden_numbers(campaign, fitness):
     return {**parameters, "value": found.value, "train_rmse": found.train.rmse}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_seed_1_finds_what_it_found(paper_arm):
     for fitness, numbers in json.loads(GOLDEN.read_text()).items():
         # other processors round differently, and swarms carry that on

@@ -155,7 +155,7 @@ def test_how_far_it_moves_the_model_and_that_this_may_be_all_that_remains(tmp_pa
     assert "inputs" not in " ".join(answer(result_of(without), details_of(without)))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("measured", [noisy, exact])
 def test_an_interval_holds_what_noise_of_an_input_does_where_fitted_starts_and_the_sensor_hide_it(tmp_path, measured):
     inside, alone = [], []
@@ -251,7 +251,7 @@ def test_the_covariance_of_its_error_is_that_of_drawn_columns(step):
     assert covariance[0, 0] == pytest.approx(least[0], rel=0.25)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_a_right_model_leaves_is_turned_white(tmp_path):
     """Of many torques with noise on the same motion; whitened, the misfit of the true model is noise."""
     chi2, lags = [], []
@@ -300,7 +300,7 @@ def as_if_noisy(read, rms=TORQUE_NOISE):
     return replace(read, records=tuple(replace(r, input_noise=noise) for r in read.records))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_inputs_count_as_exact_where_the_records_are_more_probable_so(tmp_path):
     """What a controller computes of a noisy speed looks as if it were measured with noise, and is exact."""
     records, steps = as_if_noisy(campaign(tmp_path / "axis", exact, computed)), []

@@ -40,7 +40,7 @@ def explored(stand, monkeypatch):
     return run
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_shape_that_is_not_the_usual_one_is_found(explored):
     found = explored(["stribeck"], "stribeck=60", "stribeck_exponent=1").exploration
     best, _ = found.ranked()[0]
@@ -50,7 +50,7 @@ def test_a_shape_that_is_not_the_usual_one_is_found(explored):
     assert fit.values["stribeck.exponent"] == pytest.approx(1.0, abs=0.15)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_another_form_of_an_effect_takes_its_place(explored):
     """As the square of the current, what saturates otherwise looks like another effect; its own form is asked for."""
     found = explored(["flux_saturation", "coulomb"], "flux_saturation=90", "coulomb=40")
@@ -91,7 +91,7 @@ def test_a_form_begins_where_the_other_one_ended(monkeypatch):
     assert {guess["stribeck.fade"] for guess in guesses[:-1]} == {0.3}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_fault_that_an_effect_makes_needless_is_dropped(explored, monkeypatch):
     """It took the place of the effect and keeps it with no size: a sound record would be accused."""
     found = explored(["supply_sag"], "supply_sag=0.03").exploration
@@ -112,7 +112,7 @@ def test_a_fault_that_an_effect_makes_needless_is_dropped(explored, monkeypatch)
     assert found.log_posterior(best) > found.log_posterior(faulty)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_model_at_which_the_search_ends_is_expanded(explored, monkeypatch):
     """Else its name may stand for a twin that was never fitted in its place."""
     for name in ("MOST_EXPANDED", "FEWEST_EXPANDED"):

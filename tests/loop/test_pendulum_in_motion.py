@@ -125,7 +125,7 @@ def test_friction_that_is_a_parameter_of_the_plant_is_not_looked_for(tmp_path):
     assert damping.low < 0.01 < damping.high < 0.015
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_nothing_is_missing_where_noise_has_a_colour_that_no_rest_shows(tmp_path):
     candidates = {name: EFFECTS[name] for name in ("coulomb", "viscous", "torque_offset")}
     clean, _ = swinging(tmp_path / "clean", 0.0)

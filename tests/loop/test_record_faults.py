@@ -75,6 +75,7 @@ def test_a_fault_of_a_record_held_out_does_not_carry_over(campaign, sound):
     assert found.parameters == sound.parameters
 
 
+@pytest.mark.nightly
 def test_a_fault_that_held_out_records_deny_is_gone_whole(campaign, monkeypatch):
     """Without an effect there is no step to withdraw; the intervals count that the record may be faulty."""
     monkeypatch.setattr(import_module("armid.loop.close_loop"), "is_denied", lambda *_: True)
@@ -86,6 +87,7 @@ def test_a_fault_that_held_out_records_deny_is_gone_whole(campaign, monkeypatch)
         assert (e.low, e.high) == (min(intervals[e.name].low, e.value), max(intervals[e.name].high, e.value))
 
 
+@pytest.mark.nightly
 def test_a_fault_of_one_record_is_told_beside_an_effect(stand):
     """What the effect leaves would else be taken for more effects."""
     file, kind, value = "short.csv", "late", 0.004
@@ -101,6 +103,7 @@ def test_a_fault_of_one_record_is_told_beside_an_effect(stand):
         assert e.low < TRUTH[e.name] < e.high
 
 
+@pytest.mark.nightly
 def test_a_parameter_that_rises_from_record_to_record_is_told(stand, campaign):
     """Each record comes from a stand with a pressure of its own."""
     rise, files = 0.03 * TRUTH["p0"], [r.file for r in campaign.train]

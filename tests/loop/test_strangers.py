@@ -1,14 +1,19 @@
 """Machines of coarse encoders: a carriage that no shipped plant describes, a disc, an arm that sticks."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import lsim
 
 from armid import Constant, Input, Output, Parameter, Plant, Scales, State
+from armid.engine import Schedule
 from armid.inference import prepared
+from armid.inference.decisions import WINDOW
 from armid.inference.kinds.effects import records_with, waves_tried
 from armid.loop import close_loop, report_of
 from armid.model import EFFECTS
+from armid.problem.problem import with_each
 from armid.record import RecordWarning, read_campaign
 from synthetic import moved, write_records
 
@@ -309,3 +314,30 @@ def test_the_zero_of_an_encoder_is_anywhere_within_a_step_and_no_record_is_accus
     assert found.inference.probabilities["unknown"] < 0.1
     for estimate, truth in zip(found.after.estimates, (0.05, 0.6, 0.08), strict=False):
         assert estimate.low < truth < estimate.high
+
+
+@pytest.mark.nightly
+def test_errors_of_the_engine_do_not_tell_a_late_voltage_from_a_late_sensor(tmp_path):
+    """From rest both move the disc alike, and friction is sharp: passed in a hundredth of a sample."""
+    rng, files, finer = np.random.default_rng(31), [], 10
+    for _ in range(4):
+        voltage = np.repeat(rng.uniform(-9.0, 9.0, 15), 40)
+        voltage[:60] = 0.0
+        at = np.floor(np.arange(finer * len(voltage)) / finer - 5.64 + 1e-9).astype(int)
+        motion = moved(lambda x, fed: turning(x, fed) - [0.0, 0.06 * np.tanh(x[1] / 0.02) / INERTIA],
+                       np.where(at < 0, 0.0, voltage[at]), 0.01 / finer, (0.0, 0.0), "zero", 4)[::finer]  # fmt: skip
+        times, speed = 0.01 * np.arange(len(voltage)), from_counts(motion, rng)
+        files.append({"time_s": times, "voltage_V": voltage, "angular_velocity_rad_s": speed})
+    records = replace(campaign(tmp_path, DISC, files), tolerances={"resistance": 0.02})
+    found = close_loop(records.model(), records, {n: EFFECTS[n] for n in ("coulomb", "drive_delay", "output_delay")})
+    chances = found.inference.probabilities["effects"]
+    assert found.verdict == "cannot_tell_apart"
+    assert max(chances["drive_delay"], chances["output_delay"]) < 0.85
+    exploration = found.inference.exploration
+    for model, value in exploration.ranked():
+        if value > exploration.ranked()[0][1] - WINDOW:
+            fit = exploration.fits[model]
+            replays = with_each(fit.records.replays, lambda ours: replace(ours, calibrations=tuple(
+                replace(c, schedule=Schedule(64)) for c in ours.calibrations)))  # fmt: skip
+            exact = replace(fit.records, replays=replays).plain.residuals(fit.z)[0]
+            assert np.sum((exact - fit.residual) ** 2) < 0.1

@@ -46,7 +46,7 @@ def test_an_axis_comes_in_metres_or_radians_with_scales_of_its_own_and_a_plant_m
     assert (output.name, output.signal, output.unit) == ("recorded_angle", "recorded_angle", "rad")
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("told", [{}, {"theta_C": math.radians(22.0), "theta_D": math.radians(-48.0)}, {"shell": 0.0}])
 def test_a_stiff_coupling_without_play_moves_as_the_rigid_arm(told):
     candidate = np.array([[3.05e6, 1.0, 0.55, 1.4]])
@@ -94,7 +94,7 @@ MOTIONS = {
 }  # fmt: skip
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.parametrize("where", MOTIONS)
 def test_all_at_once_move_as_their_plain_functions(where):
     """In steps so fine that the engine is within 1e-7 rad/s of the truth, but for the brushes' width."""

@@ -50,6 +50,7 @@ def test_the_missing_friction_is_named_the_rest_is_noise_and_the_start_held_out_
     np.testing.assert_array_equal(again.residual, closed.after.holdout.residual)
 
 
+@pytest.mark.nightly
 def test_the_report_tells_each_output_and_its_residual_is_drawn_against_speed_and_position(closed):
     report, details = report_of(closed), details_of(closed)
     assert list(report["outputs"]) == ["motor_speed", "load_angle", "deflection"]

@@ -83,7 +83,7 @@ def test_a_suite_is_the_same_from_one_process_or_two(small, tmp_path):
     assert key_path(again).read_bytes() == key_path(small).read_bytes()
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_campaign_tells_nothing_of_its_truth_and_the_package_reads_it(small):
     words = re.compile(r"effect|seed|true|noise|colou?r|white|p0|eta3|bias|class|index|key", re.IGNORECASE)
     assert sorted(each.name for each in small.iterdir()) == sorted(key_of(small)["campaigns"])

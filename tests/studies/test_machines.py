@@ -160,7 +160,7 @@ def test_campaigns_are_the_same_for_the_same_seed_also_after_a_cut(every_machine
     assert all((folder / last / f).read_bytes() == (again / last / f).read_bytes() for f in files)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_armid_reads_a_campaign_of_every_machine_and_the_key_holds_its_truth(every_machine):
     folder, entries = every_machine[0], every_machine[1]["campaigns"]
     assert [e["machine"] for e in entries.values()] == list(MACHINES)
@@ -177,7 +177,7 @@ def test_armid_reads_a_campaign_of_every_machine_and_the_key_holds_its_truth(eve
         assert set(entry["parameters"]) == {p.name for p in campaign.plant.parameters}
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_noise_in_a_record_is_what_the_key_says():
     planned, rng = plan(12, 0, ["hydraulic_boom"])
     campaign = drawn(planned, rng)

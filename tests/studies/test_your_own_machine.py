@@ -35,7 +35,7 @@ def plugin(folder):
     return f"{folder / 'plant.py'}:boom"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_the_plant_keeps_the_contract(plugin):
     plant = load_registry([plugin]).plants["boom"]
     assert [f"{f.name}: {f.sentence}" for f in check_thing("plants", "boom", plant) if not f.passed] == []

@@ -92,7 +92,7 @@ def test_workers_may_be_killed_and_end_with_their_runner(start, write_study, tmp
     assert same_results(run_study(write_study(SEEDS), jobs=2, out=tmp_path / "out"), undisturbed)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 @pytest.mark.skipif(not os.path.isdir("/proc/self"), reason="looks for processes in /proc")
 def test_an_interrupt_of_the_workers_cuts_no_run(start, write_study, tmp_path, undisturbed):
     """As a service manager sends it to every process, and the runner not among them."""

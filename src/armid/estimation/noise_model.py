@@ -86,6 +86,11 @@ class NoiseModel:
         return IS_ASSUMED if self.assumed else self.in_motion
 
     @property
+    def hides(self) -> float:
+        """Rms of white noise that hides a slow error as well: of noise that alternates little is slow."""
+        return self.innovation * (1.0 - self.alternation)
+
+    @property
     def total(self) -> float:
         """Rms of what a right model leaves."""
         return float(np.hypot(self.rms, self.moved))

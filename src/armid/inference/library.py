@@ -192,6 +192,13 @@ class Library:
         self._problems[frozenset(active)] = again = replace(records, replays=replays)
         return again
 
+    def for_estimate(self, active: Active, values: Mapping[str, float], misfit: float) -> "Library":
+        """Return the library whose problem with some effects is as accurate as their estimate asks for."""
+        problem, noise = self.problem(active), [level.hides for level in self.data.levels]
+        hidden = HIDDEN_ERROR * misfit**2 / len(self.data.sound)
+        replays = calibrated_replays(self.data.records, problem.model, problem.space, values, False, noise, hidden, 0)
+        return replace(self, _problems={frozenset(active): replace(problem, replays=replays)})
+
     def replays(
         self, model: Model, space: Space, near: Mapping[str, float], misfit: float, on_one: bool = False
     ) -> tuple[Replay, ...]:  # fmt: skip
@@ -388,27 +395,28 @@ def calibrated_replays(
     on_one: bool = False,
     noise: Sequence[float] | None = None,
     hidden: float = 0.0,
+    n_probes: int = N_PROBES_ABOUT,
 ) -> tuple[Replay, ...]:
     """Make records ready to be simulated, as accurately as their noise asks for or as a decision can tell.
 
     near: values about which it is calibrated; the candidates lie within a factor of 2 of them. on_one: on one record of
     each sampling interval, for all others of about the same. noise: of each signal [its unit]; hidden: largest mean
-    square of the engine's error, in units of the noise.
+    square of the engine's error, in units of the noise. n_probes: candidates about the known values that count too.
     """
     low, high = space.low[space.free].copy(), space.high[space.free].copy()
     for i, name in enumerate(space.free_names):
         if name in near:
             ends = sorted((near[name] / NEAR_VALUE, near[name] * NEAR_VALUE))
             low[i], high[i] = max(low[i], ends[0]), min(high[i], ends[1])
-    rows = probes(low, np.maximum(high, low), N_PROBES_ABOUT)
-    # What is tried first is weak, and a short lag may ask for finer steps than all that the box is likely to hold.
     nulls = {i: null for i, n in enumerate(space.free_names)
              if n not in near and (null := model.parameters[n].null) is not None}  # fmt: skip
-    if nulls:
-        weak = 0.5 * (low + high)
-        for i, null in nulls.items():
-            weak[i] = null + WEAK_STRENGTH * max(low[i] - null, high[i] - null, key=abs)
-        rows = np.vstack([rows, weak])
+    # What is tried first is weak, and a short lag may ask for finer steps than all that the box is likely to hold; an
+    # estimate is judged itself.
+    first = 0.5 * (low + high) if nulls else np.clip([near.get(n, np.nan) for n in space.free_names], low, high)
+    for i, null in nulls.items():
+        first[i] = null + WEAK_STRENGTH * max(low[i] - null, high[i] - null, key=abs)
+    first = np.where(np.isfinite(first), first, 0.5 * (low + high))
+    rows = np.vstack([probes(low, np.maximum(high, low), n_probes), first])
     spread = space.complete(rows)
     outputs = [o.name for o in model.plant.outputs]
     allowed, levels = None, iter(noise or ())
@@ -442,12 +450,21 @@ def is_finer(replays: Sequence[Replay], others: Sequence[Replay]) -> bool:
     """Tell whether a piece is simulated with finer steps than in other replays of the same records."""
     pairs = zip(replays, others, strict=True)
     calibrations = ((new, old) for a, b in pairs for new, old in zip(a.calibrations, b.calibrations, strict=True))
-    return any(new.schedule.substeps > old.schedule.substeps for new, old in calibrations)
+    return any(fineness(new) > fineness(old) for new, old in calibrations)
+
+
+def fineness(calibration: Calibration) -> tuple[int, float]:
+    """Return what orders schedules of a piece: steps in a sample, then how rough a sample may be without them.
+
+    The latter in thirds of each other, as `SHARES_OF_ERROR` are: ranges of states differ a little.
+    """
+    substeps, rough = calibration.schedule.substeps, calibration.schedule.rough
+    return substeps, np.inf if rough is None else -float(np.rint(np.log(np.min(rough)) / np.log(3.0)))
 
 
 def finest(*calibrations: Sequence[Calibration]) -> tuple[Calibration, ...]:
     """Return of several calibrations of the same pieces the finest for each, of equal ones the first."""
-    return tuple(max(each, key=lambda one: one.schedule.substeps) for each in zip(*calibrations, strict=True))
+    return tuple(max(each, key=fineness) for each in zip(*calibrations, strict=True))
 
 
 def alone(run: Simulation, i: int) -> Simulation:

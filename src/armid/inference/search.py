@@ -21,7 +21,7 @@ from armid.inference.declared import declared_again
 from armid.inference.evidence import expansion_of, forecast
 from armid.inference.kinds import drifts, effects, faults, unknown
 from armid.inference.kinds.hypothesis import Hypotheses, Hypothesis, Proposal, may_join, words
-from armid.inference.library import Library
+from armid.inference.library import Library, is_finer
 from armid.inference.model import Fit, finished, unless_diverged, with_data_of, with_free_shapes
 from armid.inference.model import freed as freed_shape
 from armid.inference.moves import (
@@ -402,8 +402,25 @@ def finish_all(exploration: Exploration) -> None:
         for model in todo:
             complete(exploration, model)
     weight, top = exploration.scale().weight, exploration.ranked()[0][1]
-    for model in [m for m, value in exploration.ranked()[:BEAM] if value > top - WINDOW]:
-        exploration.fits[model] = polished(exploration.fits[model], weight)
+    for model in [m for m, value in exploration.ranked() if value > top - WINDOW]:
+        exact = in_accurate_steps(exploration.fits[model], exploration.library)
+        exploration.fits[model] = polished(exact, weight)
+
+
+def in_accurate_steps(fit: Fit, library: Library) -> Fit:
+    """Return a fit with further unknowns as it stands, in steps as fine as its estimate asks for.
+
+    Those of the search serve all models with an effect. Errors of both of a pair that moves the machine alike would
+    tell them apart.
+    """
+    if fit.base is None or fits_starts(fit.base.replays):
+        return fit
+    exact = library.for_estimate(fit.active, fit.values, fit.misfit)
+    if not is_finer(exact.problem(fit.active).replays, fit.base.replays):
+        return fit
+    records = effects.records_with(fit, fit.active, exact)
+    return replace(fit, records=records, residual=records.plain.residuals(fit.z)[0],
+                   base=effects.base_of(fit, fit.active, exact))  # fmt: skip
 
 
 def may_be_far_off(exploration: Exploration, model: Hypotheses) -> bool:
