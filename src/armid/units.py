@@ -85,6 +85,15 @@ def behind(unit: str) -> str:
     return "" if unit in ("", "1") else f" {unit}"
 
 
+def counted(n: int, what: str) -> str:
+    """Return a number of things in words.
+
+    >>> counted(1, "run"), counted(2000, "run")
+    ('1 run', '2,000 runs')
+    """
+    return f"{n:,} {what}{'' if n == 1 else 's'}"
+
+
 def labelled(name: str, unit: str) -> str:
     """Return the label of an axis.
 

@@ -10,6 +10,7 @@ import click
 from armid.cli.options import command, examples, give, out_option, plugin_option, present, say, speaks, tell
 from armid.cli.report import made_by
 from armid.errors import INTERRUPTED, ArmidError
+from armid.units import counted
 
 if TYPE_CHECKING:
     from armid.study.runner import Ending
@@ -83,12 +84,12 @@ def words(ending: "Ending") -> list[str]:
 
     counts, name = ending.counts, ending.study.name
     speed = f", {ending.simulations / ending.seconds:,.0f} simulations/s" if ending.simulations else ""
-    lines = [f"{name}: {ending.finished} runs made in {span(ending.seconds)}{speed}; {counts.planned - counts.missing} "
-             f"of {counts.planned} are in {ending.folder}"]  # fmt: skip
+    made = f"{counted(ending.finished, 'run')} made in {span(ending.seconds)}{speed}"
+    lines = [f"{name}: {made}; {counts.planned - counts.missing} of {counts.planned} are in {ending.folder}"]
     if ending.interrupted:
         lines.append("interrupted: every finished run is kept, the same command goes on")
     if counts.failed:
-        lines.append(f"{counts.failed} runs failed, the first: {ending.first_error[:MOST_LETTERS_NAMED]}")
+        lines.append(f"{counted(counts.failed, 'run')} failed, the first: {ending.first_error[:MOST_LETTERS_NAMED]}")
     return lines
 
 

@@ -307,9 +307,8 @@ def misfit_remark(examination: Examination) -> str:
         return ""
     low, high = (f"{end(times.values()):.2g}" for end in (min, max))
     span = low if low == high else f"{low} to {high}"
-    many = f" and {len(times) - MOST_GROUPS_SHOWN} more" if len(times) > MOST_GROUPS_SHOWN else ""
     return (f"The model lacks something or a constant is off: the residual is {span} times the noise in "
-            f"{listed(list(times)[:MOST_GROUPS_SHOWN])}{many}. {WIDENED}")  # fmt: skip
+            f"{listed(list(times), MOST_GROUPS_SHOWN)}. {WIDENED}")  # fmt: skip
 
 
 def level_text(level: Level, unit: str, noise: float) -> str:

@@ -28,6 +28,7 @@ from armid.report.document import (
     correlation_tables,
     curve_entry,
     error_table,
+    listed,
     listing,
     made_section,
     may_be_inputs,
@@ -122,8 +123,7 @@ def identify_document(
 def answer(result: Mapping[str, Any], details: Mapping[str, Any]) -> tuple[str, ...]:
     free = {name: p for name, p in result["parameters"].items() if p["bound_low"] is not None}
     known = list(details.get("within_tolerances", ()))
-    more = f" and {len(known) - MOST_TOLERANCES} more" if len(known) > MOST_TOLERANCES else ""
-    exact = ", ".join(known[:MOST_TOLERANCES]) + more
+    exact = listed(known, MOST_TOLERANCES)
     begins = lead(free, result["error"]["holdout"] is not None)
     begins += " (constants count as exact)" if exact and any(p["low"] is not None for p in free.values()) else ""
     lost = [name for name, p in free.items() if p["low"] is None and p.get("interval_by") != "bootstrap"]

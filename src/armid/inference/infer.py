@@ -46,6 +46,7 @@ from armid.model.effects.sensor import sensor_effects
 from armid.problem.problem import by_record
 from armid.problem.space import Space
 from armid.record import Campaign
+from armid.units import counted
 
 # Returns the library with another noise or form, where an inference shows it, else the library as it is.
 Revision = Callable[[Library, "Inference"], Library]
@@ -145,14 +146,14 @@ class Inference:
         """What is probable: effects, sets, nothing, unknown, records, drifts; and constants, in their tolerances."""
         post = self.posterior
         return {
-            "effects": listed(post.of_kind("effect")),
-            "effects_beside_unknown": listed(post.of_kind("effect", True)),
+            "effects": worth_listing(post.of_kind("effect")),
+            "effects_beside_unknown": worth_listing(post.of_kind("effect", True)),
             "sets": [{"hypotheses": sorted(name for _, name in names), "probability": p}
                      for names, p in post.sets.items() if p >= LISTED],
             "nothing": post.nothing,
             "unknown": post.probability("unknown"),
-            "records": listed(post.of_kind("record")),
-            "drifts": listed(post.of_kind("drift")),
+            "records": worth_listing(post.of_kind("record")),
+            "drifts": worth_listing(post.of_kind("drift")),
             "constants": self.best.deviations,
         }  # fmt: skip
 
@@ -166,7 +167,7 @@ class Inference:
                 ((kind, name),) = other
                 if kind == "effect":
                     probabilities[name] = probabilities.get(name, 0.0) + p
-        return listed(probabilities)
+        return worth_listing(probabilities)
 
     @cached_property
     def intervals(self) -> dict[str, Interval]:
@@ -226,14 +227,14 @@ def sentence_of(chances: Mapping[str, Any]) -> str:
     """Return probabilities in one line: the effects, faults of records, drifts, nothing, and what nobody knows."""
     named = [f"{name} {p:.2f}" for name, p in chances["effects"].items()]
     left = len(named) - MOST_LEADING
-    more = [f"{left} other{'s' if left > 1 else ''}"] if left > 0 else []
+    more = [counted(left, "other")] if left > 0 else []
     faults = [f"{name} {p:.2f}" for name, p in chances["records"].items()]
     faults += [f"drift of {name.removeprefix(NAMED)} {p:.2f}" for name, p in chances["drifts"].items()]
     return "; ".join([*named[:MOST_LEADING], *more, *faults[:MOST_LEADING], f"nothing missing {chances['nothing']:.2f}",
                       f"something that the library does not hold {chances['unknown']:.2f}"])  # fmt: skip
 
 
-def listed(probabilities: Mapping[str, float]) -> dict[str, float]:
+def worth_listing(probabilities: Mapping[str, float]) -> dict[str, float]:
     """Return the probabilities that are listed, the largest first."""
     likely = {name: p for name, p in probabilities.items() if p >= LISTED}
     return dict(sorted(likely.items(), key=lambda pair: -pair[1]))

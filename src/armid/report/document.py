@@ -334,7 +334,10 @@ def correlation_tables(correlation: Mapping[str, Mapping[str, float | None]]) ->
     return (table("Correlation of the estimates", columns, rows, note),) if len(rows) > 1 else ()
 
 
-def listed(names: Sequence[str]) -> str:
+def listed(names: Sequence[str], most: int | None = None) -> str:
+    """Return names as in a sentence, from so many on the rest as a number: a, b and 3 more."""
+    if most is not None and len(names) > most:
+        return f"{', '.join(names[:most])} and {len(names) - most} more"
     return " and ".join(([", ".join(names[:-1])] if names[1:] else []) + list(names[-1:]))
 
 

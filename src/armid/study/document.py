@@ -23,7 +23,7 @@ from armid.study.analyses.paper_tables import TABLE1, TABLE2
 from armid.study.analyses.ranks import BY_CLASS, RANKS, class_ranks
 from armid.study.results import StudyResults
 from armid.study.spec import CLOSES_LOOP, IDENTIFIES, KIND_NAMES
-from armid.units import DEG, angles_in
+from armid.units import DEG, angles_in, counted
 
 # A new analysis is a file in this folder, and a name here.
 ANALYSES = (
@@ -200,7 +200,8 @@ def facts_of(evidence: Evidence) -> tuple[str, ...]:
     return (
         origin(study),
         f"Plant: {study['plant']}{effects}. Fitness: {', '.join(dict.fromkeys(runs['fitness']))}.",
-        f"{len(evidence.cases)} cases, {len(evidence.variants)} identifiers, {runs['seed'].nunique()} seeds, "
+        f"{counted(len(evidence.cases), 'case')}, {counted(len(evidence.variants), 'identifier')}, "
+        f"{counted(runs['seed'].nunique(), 'seed')}, "
         f"{'budgets' if evidence.is_suite else 'noise and windows'}: {'; '.join(evidence.settings)}.",
         f"Budget: {' and '.join(f'{b:g}' for b in sorted(set(runs['budget'])))} simulations a run; "
         f"{runs['used'].sum():,.0f} in all.",

@@ -13,7 +13,7 @@ from pandas import DataFrame, Series, concat, factorize
 from armid.report.document import Column, Table, listed
 from armid.study.analyses.analysis import N_RUNS, PAPER, PARAMETER, SETTING, VARIANT, Analysis, Evidence, is_swarm
 from armid.study.analyses.ranks import HALF, alike_text, arrived_text, compared, suite_answer
-from armid.units import scale_of
+from armid.units import counted, scale_of
 
 OVERVIEW_CAPTION = (
     "Relative error abs(value - truth)/abs(truth) in %, mean and median over all finished runs; simulations: median "
@@ -271,7 +271,7 @@ def best(evidence: Evidence, frame: DataFrame) -> tuple[str, ...]:
     settings = [s for s in noisy_first(evidence) if (known["setting"] == s).any()]
     texts = [best_at(evidence, known[known["setting"] == setting], setting) for setting in settings[:MOST_SETTINGS]]
     more = len(settings) - MOST_SETTINGS
-    rest = f"; {more} more setting{'s' if more > 1 else ''} below" if more > 0 else ""
+    rest = f"; {counted(more, 'more setting')} below" if more > 0 else ""
     return (f"Best: {'; '.join(texts)}{rest}.",) if texts else ()
 
 
@@ -280,7 +280,7 @@ def best_at(evidence: Evidence, own: DataFrame, setting: str) -> str:
     ranked, rows = len(own) > 1 and tests.n_cases > 1, own.set_index("variant")
     name = str(tests.ranks.index[0] if ranked else rows["largest_median"].idxmin())
     row: Any = rows.loc[name]
-    by = f" (mean rank {tests.ranks.iloc[0]:.3g} of {len(own)} over {tests.n_cases} cases)" if ranked else ""
+    by = f" (mean rank {tests.ranks.iloc[0]:.3g} of {len(own)} over {counted(tests.n_cases, 'case')})" if ranked else ""
     text = (f"{setting}: {name}{by}, largest error of a run {percent(row['largest_median'])} (median), "
             f"{percent(row['largest_p95'])} (95 % of {row['n']} runs)")  # fmt: skip
     if not ranked:
@@ -318,9 +318,8 @@ def undetermined(evidence: Evidence) -> tuple[str, ...]:
     names = [f"{parameter} of {case}" for case, parameter in share.index[share > HALF]]
     if not names:
         return ()
-    return (f"Not determined by the records: {listed(names[:MOST_OWN])}"
-            f"{f' and {len(names) - MOST_OWN} more' if len(names) > MOST_OWN else ''}. Their errors, and the largest "
-            "errors that these make, say nothing of an identifier.",)  # fmt: skip
+    return (f"Not determined by the records: {listed(names, MOST_OWN)}. Their errors, and the largest errors that they "
+            "make, say nothing of an identifier.",)  # fmt: skip
 
 
 def lowest_fitness(evidence: Evidence) -> str:

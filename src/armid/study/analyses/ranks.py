@@ -17,6 +17,7 @@ from armid.report.document import Column, Figure, Part, Table, Text, listed, slu
 from armid.report.style import INK, line_look, pyplot
 from armid.study.analyses.analysis import BUDGET_COLUMN, VARIANT, Analysis, Evidence, is_swarm
 from armid.study.store import ON
+from armid.units import counted
 
 # Errors of 1e-6 % and below are all as good as exact: what is left is rounding.
 ARRIVED_ERROR = 1e-8
@@ -226,7 +227,7 @@ def mean_ranks(tests: RankTests, reached: Series, setting: str, name: str) -> Ta
                        "arrived": reached.reindex(tests.ranks.index).to_numpy(float)})  # fmt: skip
     columns = (VARIANT, Column("rank", "mean rank", ".2f"), Column("median", "median of the cases [%]", ".3g", 100.0),
                Column("arrived", "arrived [%]", ".3g", 100.0))  # fmt: skip
-    title = f"Mean ranks over {tests.n_cases} cases, {setting}"
+    title = f"Mean ranks over {counted(tests.n_cases, 'case')}, {setting}"
     return Table(name, title, f"{RANK_CAPTION} {friedman_sentence(tests)}", frame, columns)
 
 
@@ -274,7 +275,7 @@ def critical_difference_figure(tests: RankTests, colours: Mapping[str, int]) -> 
             tests.ranks, p_matrix(tests), ax=axis, color_palette=look, label_fmt_left="{label} ({rank:.2f})",
             label_fmt_right="({rank:.2f}) {label}", label_props={"fontsize": 10}, crossbar_props={"color": INK},
         )  # fmt: skip
-    figure.supxlabel(f"mean rank over {tests.n_cases} cases, 1 is best", fontsize="medium")
+    figure.supxlabel(f"mean rank over {counted(tests.n_cases, 'case')}, 1 is best", fontsize="medium")
     return figure
 
 
@@ -381,12 +382,11 @@ def against(evidence: Evidence, setting: str, one: str) -> list[tuple[str, float
 def alike_text(others: Sequence[tuple[str, float]], n_cases: int) -> str:
     """Return which others the tests cannot tell from the best, "" without others. others: with their corrected p."""
     alike = [name for name, p in others if not p < SURE_LEVEL]
-    more = f" and {len(alike) - MOST_ALIKE} more" if len(alike) > MOST_ALIKE else ""
     if not alike:
         return "; it is better than each other by the tests" if others else ""
     if len(alike) == len(others) > MOST_ALIKE:
-        return f"; on {n_cases} cases the tests can tell nobody from it"
-    return f"; the tests cannot tell {listed(alike[:MOST_ALIKE])}{more} from it"
+        return f"; on {counted(n_cases, 'case')} the tests can tell nobody from it"
+    return f"; the tests cannot tell {listed(alike, MOST_ALIKE)} from it"
 
 
 def suite_answer(evidence: Evidence) -> tuple[str, ...]:
@@ -400,7 +400,7 @@ def suite_answer(evidence: Evidence) -> tuple[str, ...]:
         alike = alike_text([(name, p) for name, _, p in against(evidence, str(setting), str(best["variant"]))],
                            int(best["n"]))  # fmt: skip
         first = listed(list(own.loc[own["rank"] <= best["rank"], "variant"]))
-        line = f"Budget {setting}, {best['n']} cases: best is {first}, mean rank {best['text']}"
+        line = f"Budget {setting}, {counted(int(best['n']), 'case')}: best is {first}, mean rank {best['text']}"
         line += f" of {len(own)}{alike}."
         line += "".join(f" Your own {v} {standing(own, v)}." for v in own["variant"] if v in evidence.own)
         if len(tested):
