@@ -22,7 +22,7 @@ from armid.inference.evidence import expansion_of, forecast
 from armid.inference.kinds import drifts, effects, faults, unknown
 from armid.inference.kinds.hypothesis import Hypotheses, Hypothesis, Proposal, may_join, words
 from armid.inference.library import Library, is_finer
-from armid.inference.model import Fit, finished, unless_diverged, with_data_of, with_free_shapes
+from armid.inference.model import Fit, finished, fit_from, unless_diverged, with_data_of, with_free_shapes
 from armid.inference.model import freed as freed_shape
 from armid.inference.moves import (
     Exploration,
@@ -408,17 +408,19 @@ def finish_all(exploration: Exploration) -> None:
 
 
 def in_accurate_steps(fit: Fit, library: Library) -> Fit:
-    """Return a fit with further unknowns as it stands, in steps as fine as its estimate asks for.
+    """Return a fit in steps as fine as its estimate asks for; further unknowns are still as they stand.
 
     Those of the search serve all models with an effect. Errors of both of a pair that moves the machine alike would
     tell them apart.
     """
-    if fit.base is None or fits_starts(fit.base.replays):
+    if fits_starts(fit.records.replays):
         return fit
     exact = library.for_estimate(fit.active, fit.values, fit.misfit)
-    if not is_finer(exact.problem(fit.active).replays, fit.base.replays):
+    if not is_finer(exact.problem(fit.active).replays, fit.records.replays):
         return fit
     records = effects.records_with(fit, fit.active, exact)
+    if fit.base is None:
+        return replace(fit_from(records, fit.active, [fit.z]), constants=fit.constants)
     return replace(fit, records=records, residual=records.plain.residuals(fit.z)[0],
                    base=effects.base_of(fit, fit.active, exact))  # fmt: skip
 
