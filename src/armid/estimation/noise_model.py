@@ -87,7 +87,7 @@ class NoiseModel:
 
     @property
     def hides(self) -> float:
-        """Rms of white noise that hides a slow error as well: of noise that alternates little is slow."""
+        """Rms of the white noise that hides a slow error as well as this noise does: small where it alternates."""
         return self.innovation * (1.0 - self.alternation)
 
     @property

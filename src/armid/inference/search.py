@@ -410,8 +410,8 @@ def finish_all(exploration: Exploration) -> None:
 def in_accurate_steps(fit: Fit, library: Library) -> Fit:
     """Return a fit in steps as fine as its estimate asks for; further unknowns are still as they stand.
 
-    Those of the search serve all models with an effect. Errors of both of a pair that moves the machine alike would
-    tell them apart.
+    Those of a search serve all models with an effect. Their errors would tell two effects apart that move the machine
+    alike.
     """
     if fits_starts(fit.records.replays):
         return fit
