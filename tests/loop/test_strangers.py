@@ -9,6 +9,7 @@ from scipy.signal import lsim
 from armid import Constant, Input, Output, Parameter, Plant, Scales, State
 from armid.engine import Schedule
 from armid.inference import prepared
+from armid.inference.carry_over import over_noise
 from armid.inference.decisions import WINDOW
 from armid.inference.kinds.effects import records_with, waves_tried
 from armid.loop import close_loop, report_of
@@ -297,20 +298,22 @@ def test_sticks_of_a_coarse_encoder_tell_of_dry_friction(tmp_path):
     assert report["error"]["after"]["holdout"]["rmse"] < 4.0 * step
 
 
-def test_the_zero_of_an_encoder_is_anywhere_within_a_step_and_no_record_is_accused_of_it(tmp_path):
+@pytest.mark.parametrize("begins", [None, (0.0, 0.1, 0.9)])
+def test_the_zero_of_an_encoder_is_anywhere_within_a_step_and_no_record_is_accused_of_it(tmp_path, begins):
     """Counting begins where each record was switched on, hanging; a speed that is read besides has noise."""
     rng, step, tables = np.random.default_rng(12), 0.005, {}
-    for file in ("a.csv", "b.csv", "c.csv"):
+    for i, file in enumerate(("a.csv", "b.csv", "c.csv")):
         drive = np.concatenate([np.zeros(60), np.repeat(rng.uniform(-0.5, 0.5, 11), 40)])
         moving = moved(lambda x, u: np.array([x[1], (u - 0.6 * np.sin(x[0]) - 0.08 * x[1]) / 0.05]), drive, 0.01,
                        (0.0, 0.0), "zero", 4)  # fmt: skip
         tables[file] = {"time_s": 0.01 * np.arange(len(drive)), "drive_N_m": drive,
-                        "angle_rad": np.round(moving[:, 0] / step + rng.random()) * step,
+                        "angle_rad": np.round(moving[:, 0] / step + (begins[i] if begins else rng.random())) * step,
                         "angular_velocity_rad_s": moving[:, 1] + 0.02 * rng.normal(size=len(drive))}  # fmt: skip
     head = 'name = "arm"\nplant = "rotary_arm"\nhold = "zero"\n'
     arm = read_campaign(write_records(tmp_path / "arm", head, tables))
     found = close_loop(arm.model(), arm, {"torque_offset": EFFECTS["torque_offset"]})
     assert found.verdict == "no_discrepancy"
+    assert over_noise(found.after.train, found.after.holdout) == [False]
     assert found.inference.probabilities["unknown"] < 0.1
     for estimate, truth in zip(found.after.estimates, (0.05, 0.6, 0.08), strict=False):
         assert estimate.low < truth < estimate.high

@@ -256,6 +256,7 @@ def estimates(
     library, own = inference.exploration.library, inference.of_fit(model)
     known = {**own, **inference.intervals} if model == inference.in_force else own
     space, held = fit.records.space, held_by_bound(fit.records.space, fit.x)
+    alone = dict(zip(fit.values, fit.noise_half_width, strict=True))
     active = {key.declared for key in fit.active}
     is_unknown = inference.posterior.unknown_is_likely
     estimates = []
@@ -280,7 +281,8 @@ def estimates(
         if not max(value - low, high - value) <= within * abs(value):
             why = f" (mostly: {seen[0][0]})" if seen and seen[0][1] > 0.5 else ""
             doubts.append(f"its interval reaches more than {within:.0%} away from the value{why}")
-        ends, of_noise = shown_ends(low, high), shown_ends(one.noise_low, one.noise_high)
+        ends = shown_ends(low, high)
+        of_noise = shown_ends(*space.of_one_sign(name, value - alone[name], value + alone[name]))
         estimates.append(Estimate(public, value, unit, *ends, tuple(doubts), *of_noise, causes=causes))
     return tuple(estimates)
 

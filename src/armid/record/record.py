@@ -145,9 +145,14 @@ class Signal:
         return 1 if self.data is None else int(np.median(np.diff(np.flatnonzero(self.data))))
 
     @property
+    def zero_reach(self) -> float:
+        """How far the zero of a counted position may be off [unit]: counting began within a step either way."""
+        return self.sensor.step if self.unit in ("rad", "m") else 0.0
+
+    @property
     def zero_doubt(self) -> float:
-        """Deviation of the zero of a counted position [unit]: counting began anywhere within a step either way."""
-        return self.sensor.step / float(np.sqrt(3.0)) if self.unit in ("rad", "m") else 0.0
+        """Deviation of the zero of a counted position [unit]."""
+        return self.zero_reach / float(np.sqrt(3.0))
 
     def samples(self, piece: Piece) -> Samples:
         """Return the samples of a piece that fitness and errors see: those of its window that were measured."""
