@@ -315,7 +315,8 @@ def guessed_campaign(
     # what the plant says of an input counts, whatever the file says
     known = {i.name for i in plant.inputs if i.hold} if plant is not None else set[str]()
     open_drives = [headers[i] for i in inputs if i not in known]
-    hold = [guessed_hold(written.values(), open_drives)] if open_drives else []
+    others = f"; what the plant says of {' and '.join(sorted(known))} counts" if known else ""
+    hold = [guessed_hold(written.values(), open_drives, others)] if open_drives else []
     return guessed_text(name, tables, written, renamed, [*drives], notes, [*model, *hold], named), written
 
 
@@ -515,13 +516,13 @@ def guessed_text(
     return "\n".join(lines) + "\n"
 
 
-def guessed_hold(written: Iterable[Mapping[str, Array]], drives: Sequence[str]) -> str:
-    """Return the line that says what inputs do between two rows."""
+def guessed_hold(written: Iterable[Mapping[str, Array]], drives: Sequence[str], others: str) -> str:
+    """Return the line that says what inputs do between two rows; others: what is added on other inputs."""
     # One device drives all records: steps show that it holds, a chirp cannot.
     held = [any(np.mean(np.diff(columns[drive]) == 0.0) > KEPT for drive in drives) for columns in written]
     steps = f"is constant between two rows, as its steps in {held.count(True)} of the {len(held)} files show"
     kept = ("zero", steps) if any(held) else ("linear", "runs straight between two rows, as it changes in each row")
-    return f'hold = "{kept[0]}"  # GUESS: the drive {kept[1]}'
+    return f'hold = "{kept[0]}"  # GUESS: {" and ".join(drives)} {kept[1]}{others}'
 
 
 def about(columns: Mapping[str, Array], measured: str) -> str:

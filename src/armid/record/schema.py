@@ -208,7 +208,7 @@ TABLES = ("records", "cases", "identifiers")
 MOST_SQUARED_DOTS = 10_000_000
 # Records are held in memory, one by one.
 MOST_RECORDS_READ = 10_000
-HOLD = key(one_of("linear", "zero"), "'linear' or 'zero'", "How an input runs between its samples.")
+HOLD = key(one_of("linear", "zero"), "'linear' or 'zero'", "How an input runs between samples; the plant's own counts.")
 CONSTANTS_KEY = key(table_of(number), "a finite number in SI", "Constants of the plant, by name.")
 TOLERANCES_KEY = key(
     table_of(share), "a share from 0 to below 1",
