@@ -104,7 +104,7 @@ def test_continuous_integration_runs_the_readme_s_test_command(blocks, root):
     found = next(line for line in (root / "README.md").read_text().splitlines() if pattern in line)
     assert found == blocks[1][1].strip()
     assert '-m "(slow or browser) and not nightly"' in script
-    assert "-m nightly" in (root / ".ci" / "nightly").read_text()
+    assert "--fail-under=95" in (root / ".ci" / "nightly").read_text()
     assert all(os.access(root / ".ci" / name, os.X_OK) for name in ("run", "nightly"))
 
 
