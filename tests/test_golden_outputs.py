@@ -146,7 +146,7 @@ def test_closing_the_loop(name):
     assert_same(loop_digest(reported(armid.close_loop(ROOT / "studies" / "campaigns" / name))), golden("loops")[name])
 
 
-@pytest.mark.parametrize("name", [n if n in FAST else pytest.param(n, marks=pytest.mark.slow) for n in IDENTIFIERS])
+@pytest.mark.parametrize("name", [n if n in FAST else pytest.param(n, marks=pytest.mark.nightly) for n in IDENTIFIERS])
 def test_identifying(name, paper_arm_folder):
     fitness, told = "rmse" if "least_squares" in name else "similarity", {"budget": 1500, "seed": 3}
     # the intervals of a similarity take long, and do not hang on who found the estimate

@@ -20,7 +20,7 @@ from armid.study.store import Counts
 from commands import ended, not_drawn
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_figures_for_a_paper_are_pdf_of_its_width_without_a_title(store, monkeypatch, tmp_path):
     seen = []
     save = Figure.savefig

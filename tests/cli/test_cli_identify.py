@@ -26,7 +26,7 @@ def identified(run, small_folder, tmp_path):
     return written
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_prints_tables_and_remarks_in_units_that_people_read(run, paper_arm_folder):
     ran = run("identify", paper_arm_folder, "--budget", "800", "--identifier", "pso", "--fitness", "similarity")
     assert (ran.code, ran.err) == (0, "")
@@ -77,7 +77,7 @@ def test_fixed_values_and_bounds(identified):
     assert re.search(r"n +│ +1\.4 +│ 1 +│ fixed", text)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_effects_fitness_and_identifier_also_of_a_user_on_an_axis(identified, mine, write_axis, tmp_path):
     axis = write_axis(tmp_path / "axis")
     options = ("--window", "0:2", "--effects", "coulomb, viscous", "--bounds", "coulomb.width=0.001:0.1", "--fitness")

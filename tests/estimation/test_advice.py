@@ -159,7 +159,7 @@ def rivals(models, stroke):
     return [fitted(name, model, [record]) for name, model in models.items()]
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_a_louder_sensor_tells_less_apart_and_twins_nothing_does(rivals):
     (replay,) = rivals[0].records.replays
     repeated, *others = manoeuvre_grid(replay.model, [replay.record])

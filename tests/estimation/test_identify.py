@@ -31,7 +31,7 @@ ROOT = Path(__file__).parents[2]
 GOLDEN = ROOT / "tests" / "golden" / "paper_arm.json"
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_recovers_the_truth_of_an_independent_stand(stand, found):
     campaign = read_campaign(stand(*CLEAN, *OPTIONS, "--manoeuvres", "lower,raise,short,empty"))
     result = found(campaign, budget=12_000, fitness="rmse")

@@ -57,7 +57,7 @@ def test_a_coarse_record_has_a_noise_of_its_own(tmp_path):
     assert fine[0] == pytest.approx(0.02, rel=0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_leads_on_some_records_is_fitted_to_all(tmp_path, monkeypatch):
     many = campaign(tmp_path, 0.01, 1e-4)
     data = whitened(many.train, many.plant)

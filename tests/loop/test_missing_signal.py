@@ -73,7 +73,7 @@ def test_the_variable_is_the_position_and_the_curve_is_the_spring(axis, whole):
     assert np.max(np.abs(best.heights - spring(knots))[1:]) < 0.25 * np.ptp(spring(knots))
 
 
-@pytest.mark.slow
+@pytest.mark.nightly
 def test_what_no_candidate_is_has_no_name_and_its_signal_is_told(stand, tmp_path):
     """A spring of an arm that engages beyond an angle."""
     campaign = read_campaign(stand(*COMMON, "--effect", "cable_spring=300"))

@@ -41,6 +41,7 @@ def with_fault(campaign, file, fault, value):
     return replace(campaign, records=records)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(("file", "kind", "value", "unit"), [
     ("raise.csv", "offset", 0.02, "rad/s"), ("raise.csv", "clock", 0.004, "1"),
 ])  # fmt: skip

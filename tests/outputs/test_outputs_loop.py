@@ -84,6 +84,7 @@ def sound(tmp_path):
     return read_campaign(write_drive(tmp_path / "drive"), {"two_inertias": two_inertias})
 
 
+@pytest.mark.nightly
 def test_where_nothing_is_missing_no_sensor_is_accused(sound):
     """The angle of the shaft is small: a larger gain of its sensor would shrink the noise in it as well."""
     found = close_loop(sound.model(), sound, {"coulomb": EFFECTS["coulomb"]})
