@@ -195,8 +195,8 @@ class Library:
     def for_estimate(self, active: Active, values: Mapping[str, float], misfit: float) -> "Library":
         """Return the library whose problem with some effects is as accurate as their estimate asks for."""
         problem, noise = self.problem(active), [level.hides for level in self.data.levels]
-        hidden = HIDDEN_ERROR * misfit**2 / len(self.data.sound)
-        replays = calibrated_replays(self.data.records, problem.model, problem.space, values, False, noise, hidden, 0)
+        replays = calibrated_replays(self.data.records, problem.model, problem.space, values, False, noise,
+                                     self.hidden_error(misfit), 0)  # fmt: skip
         return replace(self, _problems={frozenset(active): replace(problem, replays=replays)})
 
     def replays(
@@ -204,8 +204,11 @@ class Library:
     ) -> tuple[Replay, ...]:  # fmt: skip
         """Return the train records ready to be simulated, as finely as a residual so many times the noise asks for."""
         noise = [level.innovation for level in self.data.levels]
-        hidden = HIDDEN_ERROR * misfit**2 / len(self.data.sound)
-        return calibrated_replays(self.data.records, model, space, near, on_one, noise, hidden)
+        return calibrated_replays(self.data.records, model, space, near, on_one, noise, self.hidden_error(misfit))
+
+    def hidden_error(self, misfit: float) -> float:
+        """Return the mean square that the engine's error may have next to such a misfit, in units of the noise."""
+        return HIDDEN_ERROR * misfit**2 / len(self.data.sound)
 
     def compiled_model(self, active: Active) -> Model:
         """Return a model that holds the first bundle with all of some candidates, or those alone where none has."""
@@ -412,10 +415,11 @@ def calibrated_replays(
              if n not in near and (null := model.parameters[n].null) is not None}  # fmt: skip
     # What is tried first is weak, and a short lag may ask for finer steps than all that the box is likely to hold; an
     # estimate is judged itself.
-    first = 0.5 * (low + high) if nulls else np.clip([near.get(n, np.nan) for n in space.free_names], low, high)
+    first = 0.5 * (low + high)
+    if not nulls:
+        first = np.clip([near.get(n, m) for n, m in zip(space.free_names, first, strict=True)], low, high)
     for i, null in nulls.items():
         first[i] = null + WEAK_STRENGTH * max(low[i] - null, high[i] - null, key=abs)
-    first = np.where(np.isfinite(first), first, 0.5 * (low + high))
     rows = np.vstack([probes(low, np.maximum(high, low), n_probes), first])
     spread = space.complete(rows)
     outputs = [o.name for o in model.plant.outputs]

@@ -63,7 +63,7 @@ MOST_ENDS, MOST_COUNTED = 3, 16
 MOST_COMPLETED = 4
 # Rivals that differ from the best model in one name and are completed.
 N_RIVALS = 3
-# Best models of each size that are expanded outside the window, completed, polished, carried on from short pieces.
+# Best models of each size that are expanded outside the window, completed, carried on from short pieces.
 BEAM = 3
 
 
