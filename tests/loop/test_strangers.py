@@ -8,6 +8,7 @@ from scipy.signal import lsim
 
 from armid import Constant, Input, Output, Parameter, Plant, Scales, State
 from armid.engine import Schedule
+from armid.estimation.corrections import rms
 from armid.inference import prepared
 from armid.inference.carry_over import over_noise
 from armid.inference.decisions import WINDOW
@@ -313,7 +314,13 @@ def test_the_zero_of_an_encoder_is_anywhere_within_a_step_and_no_record_is_accus
     arm = read_campaign(write_records(tmp_path / "arm", head, tables))
     found = close_loop(arm.model(), arm, {"torque_offset": EFFECTS["torque_offset"]})
     assert found.verdict == "no_discrepancy"
-    assert over_noise(found.after.train, found.after.holdout) == [False]
+    unseen = found.after.holdout
+    assert over_noise(found.after.train, unseen) == [False]
+    assert unseen.errors.outputs["angle"].rmse < 1.2 * unseen.noise_of["angle"]
+    # a zero that is off by more than a step is an error of the record
+    counted = next(one for one in unseen.replays if one.record.unit == "rad")
+    simulated = counted.signal(unseen.candidate[np.newaxis])[0]
+    assert rms(counted.measuring(simulated + 3.0 * step).zeroed(simulated) - simulated) == pytest.approx(2.0 * step)
     assert found.inference.probabilities["unknown"] < 0.1
     for estimate, truth in zip(found.after.estimates, (0.05, 0.6, 0.08), strict=False):
         assert estimate.low < truth < estimate.high

@@ -411,7 +411,8 @@ def versions_of(packages: Sequence[str]) -> dict[str, str]:
 
 
 def record_errors(replay: Replay, candidate: Array) -> Errors:
-    measured, simulated = replay.measured, replay.signal(candidate[np.newaxis])
+    simulated = replay.signal(candidate[np.newaxis])
+    measured = replay.zeroed(simulated[0])
     square = float(mean_square(measured, simulated)[0])
     noise, interval = replay.record.noise.rms, replay.record.spacing
     s, s1, s2 = (float(v[0]) for v in similarity(measured, simulated, interval, noise=noise))

@@ -135,13 +135,7 @@ def over_noise_of_each(train: Residuals, holdout: Residuals) -> list[bool]:
     """Return the same of each signal of the held-out records."""
     outputs, least = [o.name for o in train.model.plant.outputs], least_noise(train, holdout)
     return [not size <= OVER_NOISE * least[outputs[replay.place]]
-            for replay, size in zip(holdout.replays, sizes_left(holdout), strict=True)]  # fmt: skip
-
-
-def sizes_left(holdout: Residuals) -> list[float]:
-    """Return what is left of each held-out signal, rms [its unit], a counted position with the zero that fits best."""
-    reaches = [replay.record.signals[0].zero_reach for replay in holdout.replays]
-    return [rms(raw - np.clip(np.mean(raw), -reach, reach)) for raw, reach in zip(holdout.raw, reaches, strict=True)]
+            for replay, size in zip(holdout.replays, map(rms, holdout.raw), strict=True)]  # fmt: skip
 
 
 def least_noise(train: Residuals, holdout: Residuals) -> dict[str, float]:

@@ -133,7 +133,7 @@ class Residuals:
         is_white = all(not (len(level.terms) or level.growth) for level in levels) and not self.data.inputs_count
         if not is_white or not any(s.step for s in sensors):
             return []
-        rng, signals = np.random.default_rng(0), [r.signal(self.candidate[np.newaxis])[0] for r in self.replays]
+        rng = np.random.default_rng(0)
         sizes = [level.rms if self.data.known else rms(raw) for level, raw in zip(levels, self.raw, strict=True)]
         fine = [np.sqrt(max(size**2 - s.rounding**2, 0.0)) for size, s in zip(sizes, sensors, strict=True)]
         counted = [
@@ -143,8 +143,8 @@ class Residuals:
         for _ in range(N_ROUNDED):
             errors = [sensor.counting_error(y, rng.random(), over) if over and sensor.step else
                       sensor.reading(y + size * rng.standard_normal(len(y)), float(r.measured[0])) - y
-                      for over, sensor, y, size, r in zip(counted, sensors, signals, fine, self.replays, strict=True)
-                      ]  # fmt: skip
+                      for r, over, sensor, y, size
+                      in zip(self.replays, counted, sensors, self.simulated, fine, strict=True)]  # fmt: skip
             draws.append(self.without_memory(self.data.white(errors)))
         return draws
 
@@ -157,17 +157,20 @@ class Residuals:
 
     @cached_property
     def raw(self) -> list[Array]:
-        """What is left of each record, not whitened, 0 where a sample is invalid."""
-        pairs = zip(self.replays, self.data.by_record(self.data.sound), strict=True)
-        return [(r.measured - r.signal(self.candidate[np.newaxis])[0]) * sound for r, sound in pairs]
+        """What is left of each record, not whitened, 0 where a sample is invalid; see `Replay.zeroed`."""
+        triples = zip(self.judged, self.simulated, self.data.by_record(self.data.sound), strict=True)
+        return [(r.zeroed(simulated) - simulated) * sound for r, simulated, sound in triples]
 
-    @property
+    @cached_property
+    def simulated(self) -> list[Array]:
+        return [r.signal(self.candidate[np.newaxis])[0] for r in self.replays]
+
+    @cached_property
     def judged(self) -> tuple[Replay, ...]:
         """The replays whose errors count: invalid samples are replaced by simulated ones."""
-        pairs = zip(self.replays, self.data.by_record(self.data.sound), strict=True)
-        return tuple(r if sound.all() else
-                     r.measuring(np.where(sound > 0.0, r.measured, r.signal(self.candidate[np.newaxis])[0]))
-                     for r, sound in pairs)  # fmt: skip
+        triples = zip(self.replays, self.simulated, self.data.by_record(self.data.sound), strict=True)
+        return tuple(r if sound.all() else r.measuring(np.where(sound > 0.0, r.measured, simulated))
+                     for r, simulated, sound in triples)  # fmt: skip
 
     @cached_property
     def variables(self) -> dict[str, Array]:

@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 
 from armid.errors import ArmidError
+from armid.estimation.corrections import rms
 from armid.estimation.identify import versions_of
 from armid.estimation.identify_document import PACKAGES_OF_IDENTIFY
 from armid.estimation.information import NORMAL_95
 from armid.inference.candidates import ERROR_OF
-from armid.inference.carry_over import missed_sentences, over_noise, sizes_left
+from armid.inference.carry_over import missed_sentences, over_noise
 from armid.inference.checks import Finding, Residuals, time_in_words
 from armid.inference.decisions import EXPLAINS, LISTED, MENTIONED, OVER_NOISE, SIGNIFICANCE
 from armid.inference.infer import Inference, sentence_of
@@ -496,7 +497,7 @@ def carried_sentence(loop: ClosedLoop) -> str:
     judged = loop.after if loop.withdrawn is None else loop.withdrawn.judged
     unseen = judged.holdout
     assert unseen is not None
-    factors = [size / level.total for size, level in zip(sizes_left(unseen), unseen.data.levels, strict=True)]
+    factors = [rms(raw) / level.total for raw, level in zip(unseen.raw, unseen.data.levels, strict=True)]
     worst = int(np.argmax(np.nan_to_num(factors, nan=np.inf)))
     factor, file = factors[worst], unseen.data.each[worst].file
     missed = f"the error on {file} is {float(f'{factor:.3g}'):,g} times the noise"

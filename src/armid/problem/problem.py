@@ -134,6 +134,11 @@ class Replay:
     def measured(self) -> Array:
         return self.record.seen
 
+    def zeroed(self, simulated: Array) -> Array:
+        """Return what was measured, a counted position from the zero that fits a simulation best, (n_samples,)."""
+        measured, reach = self.measured, self.record.signals[0].zero_reach
+        return measured - np.clip(np.mean(measured - simulated), -reach, reach) if reach else measured
+
     @property
     def times(self) -> Array:
         pairs = zip(self.pieces, self.record.samples, strict=True)
