@@ -2,13 +2,16 @@
 
 from dataclasses import replace
 from importlib import import_module
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from arm_cases import box_of
 from armid.engine import Schedule, calibrate, probes, simulate
+from armid.engine.calibrate import FINE
 from armid.engine.simulate import chebyshev, stages_as_stable_as
+from armid.estimation.design import fine_schedule
 from armid.inference.library import quickly_calibrated
 from armid.model import EFFECTS, PLANTS, Manoeuvre, Model
 
@@ -91,14 +94,19 @@ def test_only_rough_samples_are_cut():
     assert np.array_equal(np.array(alone), simulate(RUBBED, manoeuvre, candidates, schedule, threads=2).output)
 
 
-def test_the_loop_spares_steps_where_friction_asks_for_many_and_what_is_cut_changes_smoothly():
+def test_steps_are_spared_where_friction_asks_for_many_and_what_is_cut_changes_smoothly():
     manoeuvre, candidates = rubbing()
-    found = quickly_calibrated(RUBBED, manoeuvre, candidates[:8])
-    assert found.reached
-    assert found.schedule.rough is not None
-    run, finest = (simulate(RUBBED, manoeuvre, candidates, s) for s in (found.schedule, Schedule(64)))
-    assert run.n_steps < found.schedule.substeps
-    assert np.abs(run.output - finest.output).max() < 5e-6 * RUBBED.plant.sizes[0]
+    for calibrated in (quickly_calibrated, calibrate):
+        found = calibrated(RUBBED, manoeuvre, candidates[:8])
+        assert found.reached
+        assert found.schedule.rough is not None
+        # a manoeuvre to come is simulated more finely, where it is rough as well
+        schedules = (found.schedule, fine_schedule([SimpleNamespace(calibrations=(found,))]), Schedule(64))
+        run, finer, finest = (simulate(RUBBED, manoeuvre, candidates, s) for s in schedules)
+        assert run.n_steps < finer.n_steps < found.schedule.substeps
+        error, less = (np.abs(one.output - finest.output).max() for one in (run, finer))
+        assert less < error < 5e-6 * RUBBED.plant.sizes[0]
+    assert calibrate(RUBBED, manoeuvre, candidates[:8], FINE).schedule.rough is None
     # The slope of a misfit along a fine line is the same over a short and a long way.
     schedule = Schedule(8, rough=1e-4 * np.array([1.0] * len(RUBBED.states)))
     line = candidates[0] * (1.0 + 1e-6 * np.arange(400)[:, np.newaxis] * np.array([1.0, -0.7, 0.5, 0.9]))

@@ -14,7 +14,7 @@ MOST = 20
 NUMERICS = {
     "rounding": ("DEPENDENT", "NEGLIGIBLE", "ROUNDING_OF_SIGNAL", "ROUNDING_OF_LAW", "ROUGHLY", "LEAST_CHANCE"),
     "whether differences tell a slope": ("BELIEVED", "LEAST_RISE", "BENT_RISE", "FOLLOWED"),
-    "convergence of fits and of the engine": ("SETTLED_COST", "NEAR_NOISE", "FEWEST_SPARED", "FURTHER_ERROR",
+    "convergence of fits and of the engine": ("SETTLED_COST", "NEAR_NOISE", "FURTHER_ERROR",
                                               "WIDE", "FORETOLD", "UNTOLD"),
     "budgets of computing": ("FEWEST_IN_BUNDLES", "MOST_IN_VAIN", "MOST_EFFECTS", "MOST_OF_SIZE", "MOST_RIVALS",
                              "FEWEST_OF_PART", "FEW_PLACES", "SPARED"),

@@ -1,15 +1,16 @@
 """Choose how finely time is cut, from the error measured on a spread of candidates."""
 
 from bisect import bisect_left
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
 from armid.engine.generate import LONGEST_SPAN
-from armid.engine.simulate import Schedule, Simulation, simulate
+from armid.engine.simulate import Schedule, Simulation, simulate, stages_as_stable_as
 from armid.errors import ArmidError
 from armid.model import Array, Manoeuvre, Model, Plant
 
@@ -21,6 +22,9 @@ ALLOWED = {STANDARD: 5e-6, FINE: 1e-7}
 LASTING, PASSING = 1.5e-8, 0.1
 SUBSTEPS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128)
 MARGIN_OF_STEPS = 0.5
+# From so many steps between samples on it is tried whether rough samples alone ask for them, and which these are: those
+# in which a step is uncertain by such a share of the range of a state.
+FEWEST_SPARED, SHARES_OF_ERROR = 4, (1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
 # Below this many times the engine's standard error the noise no longer hides that error.
 NOISE_HIDES = 10.0
 # How many candidates must not have switched yet for a long step to count as tried.
@@ -37,6 +41,15 @@ class Calibration:
     schedule: Schedule
     error: float
     reached: bool
+
+    @property
+    def fineness(self) -> tuple[int, float]:
+        """What orders schedules of one piece: steps in a sample, then how rough a sample may be without them.
+
+        The latter in thirds of each other, as `SHARES_OF_ERROR` are: ranges of states differ a little.
+        """
+        substeps, rough = self.schedule.substeps, self.schedule.rough
+        return substeps, np.inf if rough is None else -float(np.rint(np.log(np.min(rough)) / np.log(3.0)))
 
 
 def accuracy_against(noise: Mapping[str, float], model: Model) -> str:
@@ -130,14 +143,49 @@ def calibrate(
     schedule = Schedule(n, weights=switch_weights(candidates, run(n)))
     if spans:
         schedule = replace(schedule, plan=long_steps(model, manoeuvre, candidates, schedule, run(n), allowed))
+    # Where noise does not hide the error it has to change evenly from candidate to candidate.
+    if accuracy == STANDARD and schedule.plan is None and error <= allowed:
+        errors: list[float] = []
+
+        def is_good(tried: Simulation, finer: Simulation) -> bool:
+            errors.append(difference(tried, finer, model) * 16 / 15)
+            return errors[-1] <= MARGIN_OF_STEPS * allowed and not (tried.failed & ~finer.failed).any()
+
+        spared = with_rough_samples(model, manoeuvre, candidates, schedule, is_good)
+        if spared is not None:
+            return Calibration(spared, errors[-1], True)
     return Calibration(schedule, error, bool(error <= allowed))
+
+
+def with_rough_samples(
+    model: Model, manoeuvre: Manoeuvre, candidates: Array, schedule: Schedule,
+    is_good: Callable[[Simulation, Simulation], bool],
+) -> Schedule | None:  # fmt: skip
+    """Return a schedule that cuts rough samples alone as finely as another cuts all; None where that spares nothing.
+
+    Steps may be fine for the sake of a few samples (friction as it changes its sign); where many are rough for the sake
+    of stability (friction that holds), one stable step serves. is_good: whether a simulation is accurate enough, from
+    one in twice as many steps everywhere; what it was asked last is what is returned.
+    """
+    n = schedule.substeps
+    if n < FEWEST_SPARED:
+        return None
+    finer = simulate(model, manoeuvre, candidates, Schedule(2 * n), states=True)
+    ranges = np.array([np.max(np.ptp(state, axis=-1)) for state in finer.states.values()])
+    for stages, share in product((stages_as_stable_as(n), 0), SHARES_OF_ERROR):
+        rough = np.where(ranges > 0.0, share * ranges, np.inf)
+        tried = replace(schedule, rough=rough, refinement=max(schedule.refinement, n), stages=stages)
+        run = simulate(model, manoeuvre, candidates, tried)
+        if run.n_steps < n and is_good(run, finer):
+            return tried
+    return None
 
 
 def in_parts(model: Model, manoeuvre: Manoeuvre, candidates: Array, accuracy: str) -> Calibration:
     """Return the finest of the calibrations of parts of the candidates: all at once would fill the memory."""
     parts = [candidates[first : first + PART] for first in range(0, len(candidates), PART)]
     calibrations = [calibrate(model, manoeuvre, part, accuracy, spans=False) for part in parts]
-    schedule = replace(max((c.schedule for c in calibrations), key=lambda s: s.substeps), weights=None)
+    schedule = replace(max(calibrations, key=lambda c: c.fineness).schedule, weights=None)
     return Calibration(schedule, max(c.error for c in calibrations), all(c.reached for c in calibrations))
 
 

@@ -268,7 +268,13 @@ def key_words(key: str, value: Key) -> str:
 
 
 def fine_schedule(replays: Sequence[Replay]) -> Schedule:
-    return Schedule(FINER_GRID * max(c.schedule.substeps for r in replays for c in r.calibrations))
+    """Return how finely a manoeuvre is simulated: twice as finely as the record that asks for the finest steps."""
+    finest = max((c for r in replays for c in r.calibrations), key=lambda c: c.fineness).schedule
+    finer = Schedule(FINER_GRID * finest.substeps)
+    if finest.rough is None:
+        return finer
+    rough, refinement = finest.rough / FINER_GRID, FINER_GRID * finest.refinement
+    return replace(finer, rough=rough, refinement=refinement, stages=finest.stages)
 
 
 class Motions:

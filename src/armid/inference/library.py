@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from armid.engine import STANDARD, Calibration, Schedule, Simulation, accuracy_against, probes, simulate
-from armid.engine.calibrate import ALLOWED, MARGIN_OF_STEPS, difference, switch_weights
-from armid.engine.simulate import stages_as_stable_as
+from armid.engine.calibrate import ALLOWED, MARGIN_OF_STEPS, difference, switch_weights, with_rough_samples
 from armid.estimation.least_squares import side_by_side
 from armid.inference.candidates import (
     ERROR_OF,
@@ -377,9 +376,6 @@ def library_of(
 # Candidates of one calibration, the factor of a known value within which they lie, and the schedules that are tried:
 # friction over a width that a fast machine passes at once asks for 32 steps.
 N_PROBES_ABOUT, NEAR_VALUE, SUBSTEPS_TRIED = 8, 2.0, (1, 2, 4, 8, 16, 32)
-# From so many steps between samples on it is tried whether rough samples alone ask for them, and which these are: those
-# in which a step is uncertain by such a share of the range of a state.
-FEWEST_SPARED, SHARES_OF_ERROR = 4, (1e-3, 3e-4, 1e-4, 3e-5, 1e-5)
 # A weak strength, and the weakest from which a fit starts, as shares of the way from the null to a bound; shapes:
 # points along each of 1, 2, 3 ranges.
 WEAK_STRENGTH, WEAKEST_START = 0.03, 0.01
@@ -454,21 +450,12 @@ def is_finer(replays: Sequence[Replay], others: Sequence[Replay]) -> bool:
     """Tell whether a piece is simulated with finer steps than in other replays of the same records."""
     pairs = zip(replays, others, strict=True)
     calibrations = ((new, old) for a, b in pairs for new, old in zip(a.calibrations, b.calibrations, strict=True))
-    return any(fineness(new) > fineness(old) for new, old in calibrations)
-
-
-def fineness(calibration: Calibration) -> tuple[int, float]:
-    """Return what orders schedules of a piece: steps in a sample, then how rough a sample may be without them.
-
-    The latter in thirds of each other, as `SHARES_OF_ERROR` are: ranges of states differ a little.
-    """
-    substeps, rough = calibration.schedule.substeps, calibration.schedule.rough
-    return substeps, np.inf if rough is None else -float(np.rint(np.log(np.min(rough)) / np.log(3.0)))
+    return any(new.fineness > old.fineness for new, old in calibrations)
 
 
 def finest(*calibrations: Sequence[Calibration]) -> tuple[Calibration, ...]:
     """Return of several calibrations of the same pieces the finest for each, of equal ones the first."""
-    return tuple(max(each, key=fineness) for each in zip(*calibrations, strict=True))
+    return tuple(max(each, key=lambda c: c.fineness) for each in zip(*calibrations, strict=True))
 
 
 def alone(run: Simulation, i: int) -> Simulation:
@@ -505,23 +492,18 @@ def quickly_calibrated(
         if good:
             break
     schedule = Schedule(n, weights=switch_weights(spread, runs[n]))
-    is_fine = n >= FEWEST_SPARED
-    sound = np.array([is_fine and judged(alone(runs[n], i), alone(runs[2 * n], i))[2] for i in range(len(spread))])
-    if sound.any():
-        # Where steps are fine for the sake of a few samples (friction as it changes its sign), only these need be cut,
-        # and as finely as all would have to be; where many samples are rough for the sake of stability (friction that
-        # holds), one stable step serves. A candidate that the finest steps do not follow judges no schedule.
-        finer = simulate(model, manoeuvre, spread[sound], Schedule(2 * n), states=True)
-        ranges = np.array([np.max(np.ptp(state, axis=-1)) for state in finer.states.values()])
-        for stages, share in product((stages_as_stable_as(n), 0), SHARES_OF_ERROR):
-            rough = np.where(ranges > 0.0, share * ranges, np.inf)
-            tried = replace(schedule, rough=rough, refinement=max(schedule.refinement, n), stages=stages)
-            run = simulate(model, manoeuvre, spread[sound], tried)
-            judgement = judged(run, finer)
-            if judgement[2] and run.n_steps < n:
-                schedule = tried
-                error, is_hidden = judgement[:2] if good else (error, is_hidden)
-                break
+    # A candidate that the finest steps do not follow judges no schedule.
+    sound = np.array([judged(alone(runs[n], i), alone(runs[2 * n], i))[2] for i in range(len(spread))])
+    judgements: list[tuple[float, bool, bool]] = []
+
+    def is_good(tried: Simulation, finer: Simulation) -> bool:
+        judgements.append(judged(tried, finer))
+        return judgements[-1][2]
+
+    spared = with_rough_samples(model, manoeuvre, spread[sound], schedule, is_good) if sound.any() else None
+    if spared is not None:
+        schedule = spared
+        error, is_hidden = judgements[-1][:2] if good else (error, is_hidden)
     return Calibration(schedule, error, is_hidden or bool(error <= allowed))
 
 
