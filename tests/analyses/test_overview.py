@@ -167,6 +167,7 @@ def test_closed_loops_have_a_row_each_and_a_report_that_counts_verdicts(tmp_path
     assert report_of(failed).answer[0] == "No campaign was closed."
 
 
+@pytest.mark.slow
 def test_each_budget_is_run_by_itself(tmp_path):
     text = TABLE_STUDY.replace("seeds = 2", "seeds = 1")
     line = next(line for line in text.splitlines() if line.startswith("budget = "))

@@ -192,6 +192,7 @@ def test_a_louder_sensor_tells_less_apart_and_twins_nothing_does(rivals):
     assert np.all(unsure[0].root.diagonal() >= rivals[0].root.diagonal())
 
 
+@pytest.mark.slow
 def test_the_largest_set_that_is_told_apart_is_named(rivals):
     three = [replace(rivals[0], name=n) for n in "xyz"]
     (feasible, *_) = manoeuvre_grid(rivals[0].records.replays[0].model, [rivals[0].records.replays[0].record])

@@ -67,6 +67,7 @@ def test_least_squares_scatters_as_the_cramer_rao_bound_says(stroke, arm_space, 
     assert stopped.doubt == "the bootstrap was interrupted"
 
 
+@pytest.mark.slow
 def test_the_intervals_of_a_minimax_hold_the_truth_and_those_of_least_squares_do_not(stroke, arm_space):
     """100 noises, each minimised from the truth; 95 % intervals, where 85 to 100 may be right."""
     information = information_at((stroke,), arm_space, TRUTH)

@@ -104,6 +104,7 @@ def test_a_campaign_tells_nothing_of_its_truth_and_the_package_reads_it(small):
             assert record.rest.size == 200
 
 
+@pytest.mark.nightly
 def test_the_truth_is_away_from_the_edges_and_explains_the_records(small):
     ranges = read_suite(SUITE).ranges
     for name, entry in key_of(small)["campaigns"].items():
@@ -120,6 +121,7 @@ def test_the_truth_is_away_from_the_edges_and_explains_the_records(small):
             assert np.degrees(left) == pytest.approx(entry["noise"]["rms_deg_s"], rel=0.25)
 
 
+@pytest.mark.nightly
 def test_what_effects_do_is_told_for_each_campaign(small):
     for entry in key_of(small)["campaigns"].values():
         if entry["class"] == "single":
