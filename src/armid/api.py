@@ -157,7 +157,7 @@ def identify(
     progress: "Callable[[Meter | Refined], None] | bool | None" = None, *, options: Mapping[str, Any] | None = None,
     paper: bool = False, interval: bool = True, effects: Named = (), plugins: Iterable[str] = (),
     window: Window | None = None, bounds: Bounds | None = None, fix: Mapping[str, float] | None = None,
-    plant: str | Plant | None = None, units: str | None = None,
+    plant: str | Plant | None = None, units: str | None = None, threads: int = 1,
 ) -> "Identification":  # fmt: skip
     """Identify parameters from the train records of a campaign; `armid.identify("folder")` is enough.
 
@@ -204,6 +204,8 @@ def identify(
         The plant of tables; or a plant of your own that campaign.toml names.
     units : {"deg", "rad", "rpm"}
         In which angles and turning speeds are shown; None: as they were recorded.
+    threads : int
+        Among which candidates are shared; the result does not depend on it.
 
     Returns
     -------
@@ -243,7 +245,7 @@ def identify(
     with search_bar(progress is True) as shown:
         followed = progress if callable(progress) else shown
         identification = run(
-            read, composed, space, distance, searcher, budget, seed, target, accuracy, followed, interval
+            read, composed, space, distance, searcher, budget, seed, target, accuracy, followed, interval, threads
         )
     return replace(identification, issues=issues)
 

@@ -77,6 +77,9 @@ def test_the_budget_is_used_exactly_unless_an_identifier_stops_by_itself(lowerin
     result = identify(lowering, arm, arm_space, FITNESS["nrmse"], short, budget=5000)
     assert result.stopped == "short stopped by itself"
     assert 0 < result.used < 5000
+    shared = identify(lowering, arm, arm_space, FITNESS["nrmse"], short, budget=5000, threads=2)
+    assert {r.ready.threads for r in shared.train_replays} == {2}
+    assert shared.parameters == result.parameters
 
 
 def test_records_joined_without_noise_and_of_a_diverged_candidate(paper_arm, arm, arm_space):

@@ -26,6 +26,7 @@ from armid.cli.options import (
     seed_option,
     speaks,
     tell,
+    threads_option,
     value_of,
 )
 from armid.cli.report import show_and_save
@@ -110,11 +111,13 @@ DEFAULT_IDENTIFIER = (
     help="Give no intervals: skip the bootstrap of a fitness that is not a sum of squares.",
 )
 @seed_option
+@threads_option
 @out_option("Folder for report.html, report.md, result.json and the figures.")
 @accuracy_option
 def identify_command(
     campaign: Path, identifier: str | None, options: tuple[str, ...], fitness: str | None, budget: int | None,
-    target: float | None, paper: bool, no_interval: bool, seed: int, out: Path | None, accuracy: str, **problem: Any,
+    target: float | None, paper: bool, no_interval: bool, seed: int, threads: int, out: Path | None, accuracy: str,
+    **problem: Any,
 ) -> None:  # fmt: skip
     """Identify parameters from the train records.
 
@@ -133,7 +136,7 @@ def identify_command(
     named = {name: value_of(value) for name, value in assignments(options, "--option").items()}
     refuse_unwritable(out, IDENTIFICATION.file)
     identification = run(campaign, None, None, minimised, identifier, budget, seed, goal, accuracy_of(accuracy),
-                         speaks(), options=named, paper=paper, interval=not no_interval,
+                         speaks(), options=named, paper=paper, interval=not no_interval, threads=threads,
                          **given(**problem))  # fmt: skip
     show_and_save(identification, out)
     if identification.stopped == WAS_INTERRUPTED:
@@ -223,7 +226,7 @@ PROGRESS = "progress.jsonl"
     help="Trust a parameter whose 95 % interval is within this share of its value.",
 )
 @seed_option
-@click.option("--threads", default=2, show_default=True, type=click.IntRange(1), help="Threads of the simulations.")
+@threads_option
 def close_loop_command(
     campaign: Path, out: Path, candidates: str, without: str, no_curve: bool, within: float, seed: int, threads: int,
     **problem: Any,

@@ -177,6 +177,9 @@ seed_option = click.option(
     "--seed", default=1, show_default=True, type=click.IntRange(0),
     help="Seed of everything random; the same gives the same result.",
 )  # fmt: skip
+threads_option = click.option(
+    "--threads", default=2, show_default=True, type=click.IntRange(1), help="Threads of the simulations."
+)
 units_option = click.option(
     "--units", metavar="deg|rad|rpm", help="Show angles and turning speeds in this unit. [default: as recorded]"
 )

@@ -270,6 +270,7 @@ def identify(
     accuracy: str | None = None,
     progress: Callable[[Meter | Refined], None] | None = None,
     interval: bool = True,
+    threads: int = 1,
 ) -> Identification:
     """Search the free parameters on the train records, then judge the best candidate on train and holdout.
 
@@ -287,7 +288,7 @@ def identify(
     identifier.refuse(fitness)
     # a bad budget or target, and bad options, are refused before anything is calibrated
     identifier.build(Meter(budget, target).budget)
-    train = with_fitted_starts(replays(campaign.train, model, space, accuracy), space)
+    train = with_fitted_starts(replays(campaign.train, model, space, accuracy, threads), space)
     holdout = replays(campaign.holdout, model, space, accuracy, spans=False)
     return identified(campaign, train, holdout, space, fitness, identifier, budget, seed, target, progress, interval)
 
