@@ -199,6 +199,9 @@ def test_the_plant_of_a_plug_in_is_the_one_of_the_campaign(run, refused):
     toml = tomllib.loads(Path("mine/campaign.toml").read_text())
     assert (toml["plant"], toml["inputs"]) == ("winch", {"volts": "volts_V"})
     assert "hold" not in toml, "the plant says what its input does between two rows"
+    # a line that only has to be uncommented where a constant of a record is another
+    (own,) = [line for line in Path("mine/campaign.toml").read_text().splitlines() if line.startswith("# constants")]
+    assert tomllib.loads(own[2:])["constants"] == {"start_speed": 0}, own
     assert run("check", "mine", "--plugin", plugin).code == 0
     assert "a campaign that is made by --from is expected" in refused("new", "effect", "x", "--plugin", plugin)
 
@@ -214,6 +217,20 @@ slide = Plant(
     scales=Scales(effort=1.0, speed=1.0),
 )
 """
+
+
+def test_counts_of_an_encoder_ask_for_their_turn(run, refused):
+    times, drive, _, angle = wheel(5)
+    write(Path("a.csv"), "t_s,motor_V,turn_counts", times, drive, np.rint(angle * 100.0))
+    turner = SLIDE.replace('"m"', '"rad"').replace('"m/s"', '"rad/s"').replace('"kg"', '"kg m2"')
+    Path("turner.py").write_text(turner.replace('"N/V"', '"N m/V"').replace('Output("slide"', 'Output("turn"'))
+    assert run("new", "campaign", "mine", "--from", "a.csv", "--plugin", "turner.py:slide").code == 0
+    assert "counts_per_turn of the encoder is expected" in refused("check", "mine", "--plugin", "turner.py:slide")
+    text = Path("mine/campaign.toml").read_text()
+    assert "# counts_per_turn = 4096  # of the encoder of turn_counts: how many make a turn?\n" in text
+    assert "# constants" not in text
+    Path("mine/campaign.toml").write_text(text.replace("# counts_per_turn = 4096", "counts_per_turn = 628"))
+    assert run("check", "mine", "--plugin", "turner.py:slide").code == 0
 
 
 @pytest.mark.slow

@@ -29,6 +29,7 @@ from armid.record.resample import check_number
 from armid.record.sensor import FEWEST_REST_SAMPLES, sensor_of, stands_still
 from armid.record.table import CsvTable, missing, read_table
 from armid.registry import load_registry
+from armid.report.document import listed
 from armid.report.result import NewFiles
 from armid.units import ENDS, SUFFIXES, UNIT_ENDS
 
@@ -45,6 +46,8 @@ FOLDER_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,99}")
 # The made-up axis: inertia [kg m2], viscous friction [N m s/rad], noise of the speed [rad/s].
 INERTIA, FRICTION_OF_SHAFT, NOISE_OF_RECORDS = 0.05, 0.03, 0.01
 RECORD_INTERVAL, RECORD_SAMPLES = 0.005, 501
+# Constants that a guessed campaign names, of those that a record may hold.
+MOST_OF_RECORD = 6
 # File -> size [N m] and frequency [Hz] of the drive, seed of the noise.
 RECORDS = {"synthetic_train.csv": (1.0, 0.8, 1), "synthetic_holdout.csv": (0.7, 1.3, 2)}
 DRIVEN_FROM_S = 0.5
@@ -317,7 +320,22 @@ def guessed_campaign(
     open_drives = [headers[i] for i in inputs if i not in known]
     others = f"; what the plant says of {' and '.join(sorted(known))} counts" if known else ""
     hold = [guessed_hold(written.values(), open_drives, others)] if open_drives else []
-    return guessed_text(name, tables, written, renamed, [*drives], notes, [*model, *hold], named), written
+    counted = [header for header in headers.values() if column_of(header).end in COUNT_ENDS]
+    turn = (
+        [f"# counts_per_turn = 4096  # of the encoder of {listed(counted)}: how many make a turn?"] if counted else []
+    )
+    own = constants_of_record(plant) if is_given and plant is not None else []
+    about_all = [*model, *turn, *hold]
+    return guessed_text(name, tables, written, renamed, [*drives], notes, about_all, named, own), written
+
+
+def constants_of_record(plant: Plant) -> list[str]:
+    """Return the line, commented out, with which a record tells a constant that is another than the plant's."""
+    names = [c.name for c in sorted(plant.constants, key=lambda c: c.tolerance is not None)]
+    if not names:
+        return []
+    value = next(c.value for c in plant.constants if c.name == names[0])
+    return [f"# constants = {{ {names[0]} = {value:g} }}  # of this record alone, SI: {listed(names, MOST_OF_RECORD)}"]
 
 
 def plant_of(table: CsvTable) -> Plant | None:
@@ -498,7 +516,7 @@ def rewritten(
 
 def guessed_text(
     name: str, tables: Sequence[CsvTable], written: Mapping[str, Mapping[str, Array]], renamed: Mapping[str, str],
-    drives: Sequence[str], notes: Sequence[str], model: Sequence[str], named: Sequence[str],
+    drives: Sequence[str], notes: Sequence[str], model: Sequence[str], named: Sequence[str], own: Sequence[str],
 ) -> str:  # fmt: skip
     lines = [
         "# Written by `armid new campaign --from`: check each line with GUESS. The CSV files are copies with",
@@ -513,6 +531,7 @@ def guessed_text(
         last = i == len(written) - 1 and len(written) > 1
         lines += ["", "[[records]]", f'file = "{file}"  # {about(columns, measured)}']
         lines += [f'role = "{"holdout" if last else "train"}"' + ("  # GUESS: the last file judges" if last else "")]
+        lines += own
     return "\n".join(lines) + "\n"
 
 
