@@ -48,6 +48,7 @@ def test_what_is_no_campaign(refused, command, campaign, says):
     assert says in refused(command, campaign, *OUT.get(command, []))
 
 
+@pytest.mark.slow
 def test_refusals(refused, small_folder, mine):
     lines = (Path(__file__).parent / "refusals.txt").read_text(encoding="utf-8").splitlines()
     told = [line for line in lines if line and not line.startswith("#")]

@@ -77,6 +77,7 @@ def test_a_unit_that_nothing_tells_is_a_guess_and_an_encoder_that_is_not_used_no
     assert [s.header for s in read_campaign(tmp_path / "mine").train[0].signals] == ["angular_velocity_rad_s"]
 
 
+@pytest.mark.slow
 def test_a_column_that_is_not_used_is_not_read_as_another_input_or_output(run, tmp_path):
     times, drive, _, angle = wheel(4)
     write(tmp_path / "motor.csv", "time_s,drive_V,current_A,angle_deg,angle_rad", times, drive, 0.2 * drive,
@@ -119,6 +120,7 @@ def test_one_file_of_steps_tells_that_the_drive_is_held(run, tmp_path):
     assert "constant between two rows, as its steps in 1 of the 2 files show" in text
 
 
+@pytest.mark.slow
 def test_a_parameter_among_the_constants_is_refused_with_the_key_to_write(run, refused, tmp_path):
     times, drive, speed, _ = wheel(5)
     write(tmp_path / "a.csv", "time_s,voltage_V,speed_rad_s", times, drive, speed)

@@ -57,7 +57,8 @@ def called(run, small_folder, store, tmp_path, monkeypatch):
     return all_of
 
 
-@pytest.mark.parametrize("lines", [CALLS, pytest.param(SLOW, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("lines", [pytest.param(CALLS, marks=pytest.mark.slow),
+                                   pytest.param(SLOW, marks=pytest.mark.nightly)])  # fmt: skip
 def test_no_table_is_wider_than_the_screen_and_nothing_in_it_is_cut(called, monkeypatch, lines):
     monkeypatch.setenv("COLUMNS", "80")
     for line, ran in called(lines):

@@ -54,6 +54,7 @@ def test_at_the_estimate_it_is_the_information_there_and_what_moves_together_is_
     assert "-0.14 % of p0" in remark
 
 
+@pytest.mark.slow
 def test_an_effect_that_is_not_there_is_below_a_bound_and_its_profile_is_drawn(lowering, arm):
     model = arm + EFFECTS["coulomb"]
     with_friction = examine(lowering, model, space_of(model))

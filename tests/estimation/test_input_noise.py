@@ -138,6 +138,7 @@ def test_a_load_that_a_controller_holds_lacks_nothing(tmp_path):
     assert next(e.value for e in found.after.estimates if e.name == "inertia") == pytest.approx(INERTIA, rel=0.01)
 
 
+@pytest.mark.slow
 def test_how_far_it_moves_the_model_and_that_this_may_be_all_that_remains(tmp_path):
     """A torque with noise turns a disc as a random walk with damping, whose variance is known."""
     declared = campaign(tmp_path / "axis", noisy)

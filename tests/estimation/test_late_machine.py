@@ -48,6 +48,7 @@ def fitted(tmp_path_factory):
     return space, ready, estimate(ready, space)
 
 
+@pytest.mark.slow
 def test_the_estimate_comes_from_anywhere_in_the_range_and_intervals_hold_the_truth(fitted):
     """The steps of the voltage are 30 samples long: chi2 has its next minimum beyond them."""
     space, ready, x = fitted

@@ -49,6 +49,7 @@ def whole(axis):
     return segments(tested, space, np.empty(0), ready, [NOISE] * 3, ["torque", "output"])
 
 
+@pytest.mark.slow
 def test_the_missing_force_is_recovered_without_a_form_by_gains_of_an_impulse_over_the_mass(axis, whole):
     found = missing_signal(whole, "torque")
     assert found.share > 0.99
