@@ -151,6 +151,7 @@ def expected_of(case):
         return np.asarray(case.expected(*case.inputs[: 1 if wants_one else 2]), dtype=float)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES, ids=lambda c: c.text)
 def test_agrees_with_numpy(case, results):
     found, expected = results[case.text], expected_of(case)
@@ -162,6 +163,7 @@ def test_agrees_with_numpy(case, results):
     assert wrong.size == 0, [(case.inputs[:, i], found[i], expected[i]) for i in wrong[:5]]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", ANGLE_CASES, ids=lambda c: c.text)
 def test_sine_and_cosine_agree_with_numpy(case, results):
     found, expected = results[case.text], expected_of(case)

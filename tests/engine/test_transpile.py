@@ -45,6 +45,7 @@ def found():
     return simulate(Model(ramp, effects), Manoeuvre(1 / 64, N_SAMPLES), population, Schedule(), states=True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("function", ALL, ids=name_of)
 def test_computes_the_same_as_python(function, found):
     speeds = found.states["omega"][0]
