@@ -331,11 +331,9 @@ def guessed_campaign(
 
 def constants_of_record(plant: Plant) -> list[str]:
     """Return the line, commented out, with which a record tells a constant that is another than the plant's."""
-    names = [c.name for c in sorted(plant.constants, key=lambda c: c.tolerance is not None)]
-    if not names:
-        return []
-    value = next(c.value for c in plant.constants if c.name == names[0])
-    return [f"# constants = {{ {names[0]} = {value:g} }}  # of this record alone, SI: {listed(names, MOST_OF_RECORD)}"]
+    ordered = sorted(plant.constants, key=lambda c: c.tolerance is not None)
+    names = listed([c.name for c in ordered], MOST_OF_RECORD)
+    return [f"# constants = {{ {c.name} = {c.value:g} }}  # of this record alone, SI: {names}" for c in ordered[:1]]
 
 
 def plant_of(table: CsvTable) -> Plant | None:

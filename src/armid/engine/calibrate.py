@@ -108,7 +108,7 @@ def calibrate(
     accuracy : "standard" or "fine"
         5e-6 or 1e-7 of the size of each output (of a speed, the plant's speed scale).
     spans
-        Look for steps over several samples too, which pays when many populations follow.
+        Look for steps over several samples too, and for rough ones, which pays when many populations follow.
 
     Returns
     -------
@@ -144,28 +144,29 @@ def calibrate(
     if spans:
         schedule = replace(schedule, plan=long_steps(model, manoeuvre, candidates, schedule, run(n), allowed))
     # Where noise does not hide the error it has to change evenly from candidate to candidate.
-    if accuracy == STANDARD and schedule.plan is None and error <= allowed:
-        errors: list[float] = []
+    if spans and accuracy == STANDARD and schedule.plan is None and error <= allowed:
+
+        def error_of(tried: Simulation, finer: Simulation) -> float:
+            return np.inf if (tried.failed & ~finer.failed).any() else difference(tried, finer, model) * 16 / 15
 
         def is_good(tried: Simulation, finer: Simulation) -> bool:
-            errors.append(difference(tried, finer, model) * 16 / 15)
-            return errors[-1] <= MARGIN_OF_STEPS * allowed and not (tried.failed & ~finer.failed).any()
+            return error_of(tried, finer) <= MARGIN_OF_STEPS * allowed
 
         spared = with_rough_samples(model, manoeuvre, candidates, schedule, is_good)
         if spared is not None:
-            return Calibration(spared, errors[-1], True)
+            return Calibration(spared[0], error_of(*spared[1:]), True)
     return Calibration(schedule, error, bool(error <= allowed))
 
 
 def with_rough_samples(
     model: Model, manoeuvre: Manoeuvre, candidates: Array, schedule: Schedule,
     is_good: Callable[[Simulation, Simulation], bool],
-) -> Schedule | None:  # fmt: skip
+) -> tuple[Schedule, Simulation, Simulation] | None:  # fmt: skip
     """Return a schedule that cuts rough samples alone as finely as another cuts all; None where that spares nothing.
 
     Steps may be fine for the sake of a few samples (friction as it changes its sign); where many are rough for the sake
     of stability (friction that holds), one stable step serves. is_good: whether a simulation is accurate enough, from
-    one in twice as many steps everywhere; what it was asked last is what is returned.
+    one in twice as many steps everywhere; both are returned with the schedule.
     """
     n = schedule.substeps
     if n < FEWEST_SPARED:
@@ -177,7 +178,7 @@ def with_rough_samples(
         tried = replace(schedule, rough=rough, refinement=max(schedule.refinement, n), stages=stages)
         run = simulate(model, manoeuvre, candidates, tried)
         if run.n_steps < n and is_good(run, finer):
-            return tried
+            return tried, run, finer
     return None
 
 
@@ -185,7 +186,7 @@ def in_parts(model: Model, manoeuvre: Manoeuvre, candidates: Array, accuracy: st
     """Return the finest of the calibrations of parts of the candidates: all at once would fill the memory."""
     parts = [candidates[first : first + PART] for first in range(0, len(candidates), PART)]
     calibrations = [calibrate(model, manoeuvre, part, accuracy, spans=False) for part in parts]
-    schedule = replace(max(calibrations, key=lambda c: c.fineness).schedule, weights=None)
+    schedule = Schedule(max(c.schedule.substeps for c in calibrations))
     return Calibration(schedule, max(c.error for c in calibrations), all(c.reached for c in calibrations))
 
 

@@ -96,7 +96,7 @@ def kernel_text(parts: KernelParts) -> str:
         variable_start_string="{", variable_end_string="}", trim_blocks=True, lstrip_blocks=True,
         keep_trailing_newline=True, undefined=StrictUndefined, loader=FileSystemLoader(TEMPLATE.parent),
     )  # fmt: skip
-    environment.filters |= {"listed": listed, "nested": nested}
+    environment.filters |= {"comma_ended": comma_ended, "nested": nested}
     late_of = parts.late_states
     remembered = {one.place: one.of for one in late_of}
     count_of = Counter(one.delay for one in late_of)
@@ -109,7 +109,7 @@ def kernel_text(parts: KernelParts) -> str:
     )  # fmt: skip
 
 
-def listed(names: Iterable[Any], prefix: str = "") -> str:
+def comma_ended(names: Iterable[Any], prefix: str = "") -> str:
     return "".join(f"{prefix}{n}, " for n in names)
 
 
@@ -124,7 +124,7 @@ def variable(key: str) -> str:
 
 
 def tuple_of(values: list[str]) -> str:
-    return f"({listed(values)})"
+    return f"({comma_ended(values)})"
 
 
 def bundle_of(values: list[str]) -> str:

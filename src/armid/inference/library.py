@@ -494,16 +494,12 @@ def quickly_calibrated(
     schedule = Schedule(n, weights=switch_weights(spread, runs[n]))
     # A candidate that the finest steps do not follow judges no schedule.
     sound = np.array([judged(alone(runs[n], i), alone(runs[2 * n], i))[2] for i in range(len(spread))])
-    judgements: list[tuple[float, bool, bool]] = []
-
-    def is_good(tried: Simulation, finer: Simulation) -> bool:
-        judgements.append(judged(tried, finer))
-        return judgements[-1][2]
-
-    spared = with_rough_samples(model, manoeuvre, spread[sound], schedule, is_good) if sound.any() else None
+    spared = None
+    if sound.any():
+        spared = with_rough_samples(model, manoeuvre, spread[sound], schedule, lambda run, finer: judged(run, finer)[2])
     if spared is not None:
-        schedule = spared
-        error, is_hidden = judgements[-1][:2] if good else (error, is_hidden)
+        schedule = spared[0]
+        error, is_hidden = judged(*spared[1:])[:2] if good else (error, is_hidden)
     return Calibration(schedule, error, is_hidden or bool(error <= allowed))
 
 
