@@ -9,7 +9,7 @@ import pytest
 
 from arm_cases import box_of
 from armid.engine import Schedule, calibrate, probes, simulate
-from armid.engine.calibrate import FINE
+from armid.engine.calibrate import FINE, Calibration
 from armid.engine.simulate import chebyshev, stages_as_stable_as
 from armid.estimation.design import fine_schedule
 from armid.inference.library import quickly_calibrated
@@ -130,6 +130,22 @@ def test_steps_are_spared_where_more_than_eight_are_asked_for_and_next_to_what_n
         run, finest = (simulate(RUBBED, manoeuvre, sharp, s) for s in (found.schedule, Schedule(128)))
         assert run.n_steps < 0.6 * found.schedule.substeps
         assert np.abs(run.output - finest.output).max() < 5e-6 * RUBBED.plant.sizes[0]
+
+
+def test_steps_at_hand_are_kept_where_they_are_accurate_enough_whatever_their_number():
+    manoeuvre, candidates = rubbing()
+    own = quickly_calibrated(RUBBED, manoeuvre, candidates[:8])
+    everywhere = Calibration(Schedule(own.schedule.substeps), own.error, True)
+    in_few = replace(own, schedule=replace(own.schedule, substeps=16, refinement=16, rough=1e3 * own.schedule.rough))
+    for at_hand, is_kept in (
+        (own, True),
+        (everywhere, True),
+        (in_few, False),
+        (Calibration(Schedule(1), 0.0, True), False),
+    ):
+        found = quickly_calibrated(RUBBED, manoeuvre, candidates[:8], at_hand=at_hand)
+        assert (found is at_hand) == is_kept
+        assert found.error < 5e-6 * RUBBED.plant.sizes[0]
 
 
 @pytest.mark.parametrize("n", [2, 3, 6, 12])

@@ -166,3 +166,17 @@ def test_no_record_tells_an_effect_from_what_all_free_parameters_do_together(tmp
         library, fit = prepared(Model(arm.plant), arm, candidates)
         found.append({key.public: names for key in library.joinable(()) if (names := done_together(fit, key, library))})
     assert found == [{"drive_gain": ("inertia", "gravity_moment", "damping")}, {}]
+
+
+def test_steps_of_what_is_tried_are_those_of_strengths_to_expect(tmp_path):
+    """A ripple a thousand times as strong would ask for the finest steps of all fits that hold one."""
+    records = {f"r{i}.csv": table for i, table in enumerate(tables(np.random.default_rng(9)))}
+    axis = read_campaign(write_records(tmp_path, 'name = "axis"\nplant = "driven_axis"\n', records, holdout=0))
+    library, declared = prepared(Model(axis.plant), axis, {n: EFFECTS[n] for n in ("torque_ripple", "drive_delay")})
+    assert library.reach > 1.0
+    key = EffectKey("torque_ripple")
+    problem = library.problem((key,), declared.values)
+    anywhere = library.replays(problem.model, problem.space, declared.values, library.misfit)
+    most, least = (max(c.schedule.substeps for r in replays for c in r.calibrations)
+                   for replays in (anywhere, problem.replays))  # fmt: skip
+    assert least < most

@@ -44,12 +44,9 @@ class Calibration:
 
     @property
     def fineness(self) -> tuple[int, float]:
-        """What orders schedules of one piece: steps in a sample, then how rough a sample may be without them.
-
-        The latter in thirds of each other, as `SHARES_OF_ERROR` are: ranges of states differ a little.
-        """
-        substeps, rough = self.schedule.substeps, self.schedule.rough
-        return substeps, np.inf if rough is None else -float(np.rint(np.log(np.min(rough)) / np.log(3.0)))
+        """What orders schedules of one piece: steps in a sample, then how rough a sample may be without them."""
+        rough = self.schedule.rough
+        return self.schedule.substeps, 0.0 if rough is None else -float(np.min(rough))
 
 
 def accuracy_against(noise: Mapping[str, float], model: Model) -> str:

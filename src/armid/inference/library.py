@@ -14,7 +14,7 @@ from itertools import product
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from armid.engine import STANDARD, Calibration, Schedule, Simulation, accuracy_against, probes, simulate
 from armid.engine.calibrate import ALLOWED, MARGIN_OF_STEPS, difference, switch_weights, with_rough_samples
@@ -147,10 +147,14 @@ class Library:
         return self._problems[key]
 
     def schedules(self, key: EffectKey, model: Model, near: Mapping[str, float]) -> "Schedules":
-        """Return how finely a candidate alone is simulated with a compiled model."""
+        """Return how finely a candidate alone is simulated with a compiled model, at strengths of a size to expect.
+
+        A strength far beyond that asks for steps that nothing else needs; what is found there is calibrated anew.
+        """
         known = self._schedules.get((key.declared, model))
         if known is None or not known.serves(self.misfit):
-            replays = self.replays(model, self.space(model, (key,)), near, self.misfit, on_one=True)
+            space = replace(self, reach=1.0).space(model, (key,))
+            replays = self.replays(model, space, near, self.misfit, on_one=True)
             known = Schedules(self.misfit, {r.record.file: r.calibrations for r in replays})
             self._schedules[key.declared, model] = known
         return known
@@ -180,30 +184,34 @@ class Library:
         return replace(self.with_data(self.data.of_records(which), read), _schedules={})
 
     def recalibrated(self, active: Active, values: Mapping[str, float], misfit: float) -> WhiteRecords | None:
-        """Return the problem with finer steps where those at hand are too coarse at some values, else None.
+        """Return the problem in other steps where those at hand are too coarse at some values, else None.
 
         misfit: of the fit to which the values belong.
         """
         records = self.problem(active)
-        replays = self.replays(records.model, records.space, values, misfit)
-        if not is_finer(replays, records.replays):
+        replays = self.replays(records.model, records.space, values, misfit, at_hand=records.replays)
+        if are_scheduled_alike(replays, records.replays):
             return None
         self._problems[frozenset(active)] = again = replace(records, replays=replays)
         return again
 
-    def for_estimate(self, active: Active, values: Mapping[str, float], misfit: float) -> "Library":
+    def for_estimate(
+        self, active: Active, values: Mapping[str, float], misfit: float, at_hand: Sequence[Replay]
+    ) -> "Library":
         """Return the library whose problem with some effects is as accurate as their estimate asks for."""
         problem, noise = self.problem(active), [level.hides for level in self.data.levels]
         replays = calibrated_replays(self.data.records, problem.model, problem.space, values, False, noise,
-                                     self.hidden_error(misfit), 0)  # fmt: skip
+                                     self.hidden_error(misfit), 0, at_hand)  # fmt: skip
         return replace(self, _problems={frozenset(active): replace(problem, replays=replays)})
 
     def replays(
-        self, model: Model, space: Space, near: Mapping[str, float], misfit: float, on_one: bool = False
+        self, model: Model, space: Space, near: Mapping[str, float], misfit: float, on_one: bool = False,
+        at_hand: Sequence[Replay] = (),
     ) -> tuple[Replay, ...]:  # fmt: skip
         """Return the train records ready to be simulated, as finely as a residual so many times the noise asks for."""
         noise = [level.innovation for level in self.data.levels]
-        return calibrated_replays(self.data.records, model, space, near, on_one, noise, self.hidden_error(misfit))
+        return calibrated_replays(self.data.records, model, space, near, on_one, noise, self.hidden_error(misfit),
+                                  at_hand=at_hand)  # fmt: skip
 
     def hidden_error(self, misfit: float) -> float:
         """Return the mean square that the engine's error may have next to such a misfit, in units of the noise."""
@@ -395,12 +403,14 @@ def calibrated_replays(
     noise: Sequence[float] | None = None,
     hidden: float = 0.0,
     n_probes: int = N_PROBES_ABOUT,
+    at_hand: Sequence[Replay] = (),
 ) -> tuple[Replay, ...]:
     """Make records ready to be simulated, as accurately as their noise asks for or as a decision can tell.
 
     near: values about which it is calibrated; the candidates lie within a factor of 2 of them. on_one: on one record of
     each sampling interval, for all others of about the same. noise: of each signal [its unit]; hidden: largest mean
     square of the engine's error, in units of the noise. n_probes: candidates about the known values that count too.
+    at_hand: the same records in steps that are kept where they are accurate enough.
     """
     low, high = space.low[space.free].copy(), space.high[space.free].copy()
     for i, name in enumerate(space.free_names):
@@ -420,8 +430,9 @@ def calibrated_replays(
     spread = space.complete(rows)
     outputs = [o.name for o in model.plant.outputs]
     allowed, levels = None, iter(noise or ())
-    asked: dict[object, tuple[Manoeuvre, Array | None, str]] = {}
+    asked: dict[object, tuple[Manoeuvre, Array | None, str, Calibration | None]] = {}
     ready: list[tuple[Record, list[object]]] = []
+    held = {r.record.file: r.calibrations for r in at_hand}
     for record in records:
         if noise is not None:
             allowed = np.full(len(outputs), np.inf)
@@ -430,15 +441,16 @@ def calibrated_replays(
         record = record.until_window_end()  # noqa: PLW2901
         accuracy = accuracy_against(record.noises, model)
         about = [int(np.log(p.manoeuvre.interval) / np.log(SAME_INTERVAL)) for p in record.pieces]
-        likenesses: list[object] = [(accuracy, i if on_one else p.manoeuvre.likeness())
-                                    for p, i in zip(record.pieces, about, strict=True)]  # fmt: skip
-        for likeness, piece in zip(likenesses, record.pieces, strict=True):
+        ours = held.get(record.file) or (None,) * len(about)
+        likenesses: list[object] = [(accuracy, id(kept), i if on_one else p.manoeuvre.likeness())
+                                    for p, i, kept in zip(record.pieces, about, ours, strict=True)]  # fmt: skip
+        for likeness, piece, kept in zip(likenesses, record.pieces, ours, strict=True):
             # of several the one whose input jumps most often: steps that are rough at jumps alone are many there
             if likeness not in asked or piece.manoeuvre.changes > asked[likeness][0].changes:
-                asked[likeness] = (piece.manoeuvre, allowed, accuracy)
+                asked[likeness] = (piece.manoeuvre, allowed, accuracy, kept)
         ready.append((record, likenesses))
-    known = {likeness: quickly_calibrated(model, manoeuvre, spread, most, accuracy)
-             for likeness, (manoeuvre, most, accuracy) in asked.items()}  # fmt: skip
+    known = {likeness: quickly_calibrated(model, manoeuvre, spread, most, accuracy, kept)
+             for likeness, (manoeuvre, most, accuracy, kept) in asked.items()}  # fmt: skip
     return tuple(
         one
         for record, likenesses in ready
@@ -446,11 +458,10 @@ def calibrated_replays(
     )
 
 
-def is_finer(replays: Sequence[Replay], others: Sequence[Replay]) -> bool:
-    """Tell whether a piece is simulated with finer steps than in other replays of the same records."""
+def are_scheduled_alike(replays: Sequence[Replay], others: Sequence[Replay]) -> bool:
+    """Tell whether each piece is simulated in the very steps of other replays of the same records."""
     pairs = zip(replays, others, strict=True)
-    calibrations = ((new, old) for a, b in pairs for new, old in zip(a.calibrations, b.calibrations, strict=True))
-    return any(new.fineness > old.fineness for new, old in calibrations)
+    return all(new is old for a, b in pairs for new, old in zip(a.calibrations, b.calibrations, strict=True))
 
 
 def finest(*calibrations: Sequence[Calibration]) -> tuple[Calibration, ...]:
@@ -458,17 +469,19 @@ def finest(*calibrations: Sequence[Calibration]) -> tuple[Calibration, ...]:
     return tuple(max(each, key=lambda c: c.fineness) for each in zip(*calibrations, strict=True))
 
 
-def alone(run: Simulation, i: int) -> Simulation:
-    """Return a simulation of one candidate of several."""
-    return replace(run, outputs=run.outputs[:, i : i + 1], failed=run.failed[i : i + 1])
+def some_of(run: Simulation, which: slice | NDArray[np.bool_]) -> Simulation:
+    """Return a simulation of some of its candidates."""
+    return replace(run, outputs=run.outputs[:, which], failed=run.failed[which])
 
 
 def quickly_calibrated(
-    model: Model, manoeuvre: Manoeuvre, spread: Array, rms: Array | None = None, accuracy: str = STANDARD
-) -> Calibration:
+    model: Model, manoeuvre: Manoeuvre, spread: Array, rms: Array | None = None, accuracy: str = STANDARD,
+    at_hand: Calibration | None = None,
+) -> Calibration:  # fmt: skip
     """Return the coarsest of few schedules whose error on the candidates stays within half of what is allowed.
 
-    Or within half of `rms`, that of each output [its unit], (n_outputs,), as a root mean square over the samples.
+    Or within half of `rms`, that of each output [its unit], (n_outputs,), as a root mean square over the samples; the
+    one at hand where its error does.
     `calibrate` would go on to steps that a screening of candidates cannot pay (a ripple so fine that the motion is a
     matter of chance asks for 128 in a sample), and would look for steps over several samples.
     """
@@ -493,7 +506,12 @@ def quickly_calibrated(
             break
     schedule = Schedule(n, weights=switch_weights(spread, runs[n]))
     # A candidate that the finest steps do not follow judges no schedule.
-    sound = np.array([judged(alone(runs[n], i), alone(runs[2 * n], i))[2] for i in range(len(spread))])
+    each = [slice(i, i + 1) for i in range(len(spread))]
+    sound = np.array([judged(some_of(runs[n], i), some_of(runs[2 * n], i))[2] for i in each])
+    if at_hand is not None and (good or at_hand.schedule.substeps >= n):
+        run = simulate(model, manoeuvre, spread[sound], at_hand.schedule) if sound.any() else None
+        if run is None or judged(run, some_of(runs[2 * n], sound))[2]:
+            return at_hand
     spared = None
     if sound.any():
         spared = with_rough_samples(model, manoeuvre, spread[sound], schedule, lambda run, finer: judged(run, finer)[2])

@@ -13,7 +13,7 @@ from armid.estimation.constants import NAMED, Product, products
 from armid.estimation.information import information_at, start_changes
 from armid.estimation.least_squares import AT_BOUND, MOST_ROUNDS, SETTLED_CHI2, descend, held_by_bound, promised_fall
 from armid.inference.candidates import Active, EffectKey, idle
-from armid.inference.library import Activation, Library, calibrated_replays, finest, is_finer, points_within
+from armid.inference.library import Activation, Library, are_scheduled_alike, calibrated_replays, points_within
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array, Model
 from armid.problem.problem import by_record, with_each
@@ -210,13 +210,12 @@ def accurate_enough(fit: Fit) -> Fit:
     """Return a fit about its own starts whose records are simulated as accurately as their noise asks for."""
     records = fit.records
     each = [ready.record for ready in by_record(records.replays)]
-    enough = calibrated_replays(each, fit.model, records.space, fit.values)
-    if not is_finer(enough, records.replays):
+    enough = calibrated_replays(each, fit.model, records.space, fit.values, at_hand=records.replays)
+    if are_scheduled_alike(enough, records.replays):
         return with_own_starts(fit)
-    # The pieces are those of the fit, whose constants may be others than the record's; none is simulated coarser.
+    # The pieces are those of the fit, whose constants may be others than the record's.
     theirs = {r.record.file: r.calibrations for r in enough}
-    replays = with_each(records.replays, lambda ours: replace(
-        ours, calibrations=finest(theirs[ours.record.file], ours.calibrations)))  # fmt: skip
+    replays = with_each(records.replays, lambda ours: replace(ours, calibrations=theirs[ours.record.file]))
     again = fit_from(replace(records, replays=replays), fit.active, [fit.z])
     return with_own_starts(replace(again, constants=fit.constants))
 

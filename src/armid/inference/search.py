@@ -21,7 +21,7 @@ from armid.inference.declared import declared_again
 from armid.inference.evidence import expansion_of, forecast
 from armid.inference.kinds import drifts, effects, faults, unknown
 from armid.inference.kinds.hypothesis import Hypotheses, Hypothesis, Proposal, may_join, words
-from armid.inference.library import Library, is_finer
+from armid.inference.library import Library, are_scheduled_alike
 from armid.inference.model import Fit, finished, fit_from, unless_diverged, with_data_of, with_free_shapes
 from armid.inference.model import freed as freed_shape
 from armid.inference.moves import (
@@ -415,8 +415,8 @@ def in_accurate_steps(fit: Fit, library: Library) -> Fit:
     """
     if fits_starts(fit.records.replays):
         return fit
-    exact = library.for_estimate(fit.active, fit.values, fit.misfit)
-    if not is_finer(exact.problem(fit.active).replays, fit.records.replays):
+    exact = library.for_estimate(fit.active, fit.values, fit.misfit, fit.records.replays)
+    if are_scheduled_alike(exact.problem(fit.active).replays, fit.records.replays):
         return fit
     records = effects.records_with(fit, fit.active, exact)
     if fit.base is None:
