@@ -5,7 +5,7 @@ Each is undone by a size; `column_of` gives what a unit of it does to the whiten
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -191,10 +191,17 @@ def sinc_weights(n: int, places: Array) -> tuple[NDArray[np.int64], Array, NDArr
     """
     inside = np.clip(places, 0.0, n - 1.0)
     begin = np.minimum(np.floor(inside), n - 2.0)
-    parts, which = np.unique(np.round(inside - begin, DIGITS_OF_PLACE), return_inverse=True)
+    return begin.astype(np.int64), *weights_between(np.round(inside - begin, DIGITS_OF_PLACE).tobytes())
+
+
+# A slope moves one unknown at a time: the places in most records are those of the simulation before.
+@lru_cache(maxsize=8)
+def weights_between(places: bytes) -> tuple[Array, NDArray[np.int64]]:
+    """Return weights of the samples near, and which of them are those of each place, a share of the way to the next."""
+    parts, which = np.unique(np.frombuffer(places), return_inverse=True)
     away = parts[:, np.newaxis] - (np.arange(2 * SIDE_SAMPLES) - SIDE_SAMPLES + 1)
     weights = np.sinc(away) * np.cos(0.5 * np.pi * away / SIDE_SAMPLES) ** 2
-    return begin.astype(np.int64), weights / np.sum(weights, axis=1, keepdims=True), which
+    return weights / np.sum(weights, axis=1, keepdims=True), which
 
 
 def faults_of(base: WhiteRecords, index: int) -> Iterator[Fault]:
