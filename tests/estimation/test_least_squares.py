@@ -106,6 +106,16 @@ def test_a_slope_beside_a_region_that_diverges_is_one_sided_and_what_has_no_infl
         np.testing.assert_allclose(descend(problem, [np.array([0.9, 0.7])], 1e-10, central), [0.25, 0.7], atol=1e-8)
 
 
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_slope_next_to_a_jump_is_that_of_its_own_side(side):
+    def signal(z):
+        return np.array([3.0, 4.0]) * z[0] + 9.0 * (side * (z[0] - 0.5) > 5e-7)
+
+    problem = analytic(signal, np.array([1.4, 2.1]), 1)
+    _, slopes = problem.residual_and_slopes(np.array([0.5]))
+    np.testing.assert_allclose(slopes, [[3.0], [4.0]], rtol=1e-8)
+
+
 def test_a_fixed_parameter_stays_and_weights_count(lowering_replays, arm_space):
     (good,) = (noisy(r, rms=0.0).measuring(r.signal(TRUTH[np.newaxis])[0]) for r in lowering_replays)
     np.testing.assert_allclose(estimate((good,), arm_space), TRUTH, rtol=1e-5)

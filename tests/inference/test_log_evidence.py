@@ -51,6 +51,13 @@ def expansion(residual, scale=None):
     return Expansion(stub(residual), scale or Scale(N, 1.0, 1e9), library, np.empty((N, 0)))
 
 
+def test_columns_that_rounding_does_not_tell_apart_have_a_covariance(monkeypatch):
+    """As those of a model that jumps next to its estimate."""
+    monkeypatch.setitem(globals(), "JACOBIAN", 1e8 * (JACOBIAN[:, :1] + np.array([0.0, 1e-9])))
+    about = expansion(np.ones(N))
+    assert np.all(np.diag(about.covariance) > 0.0)
+
+
 def proposal(columns, scales, **more):
     return Proposal(
         Hypothesis("effect", "x"), columns, np.array(scales), np.zeros(len(columns)), lambda *_: None, **more

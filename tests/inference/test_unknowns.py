@@ -100,3 +100,14 @@ def test_a_bent_answer_to_an_unknown_has_the_slope_of_its_tangent():
     unknowns = [Unknown("straight", lambda records, value: records.moved(0, value)), Unknown("bent", bent)]
     found = columns_about(base, unknowns, np.zeros(2), np.empty(0), {})
     np.testing.assert_allclose(found, columns, atol=1e-6)
+
+
+def test_the_column_of_an_unknown_next_to_a_jump_is_that_of_its_own_side():
+    columns = RNG.normal(size=(50, 2))
+
+    def jumps(records, value):
+        return replace(records, residual=records.residual - value * columns[:, 1] - 100.0 * (value < 0.0))
+
+    unknowns = [Unknown("straight", lambda records, value: records.moved(0, value)), Unknown("jumps", jumps)]
+    found = columns_about(Straight(columns, np.ones(50)), unknowns, np.zeros(2), np.empty(0), {})
+    np.testing.assert_allclose(found, columns, atol=1e-6)

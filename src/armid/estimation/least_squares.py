@@ -37,6 +37,9 @@ AT_BOUND = 1e-5
 TOLERANCE = 1e-9
 # A delay this close to a jump of chi2 does not step over it, and lies at least so far from it, in sample intervals.
 NEXT_TO_JUMP, OFF_JUMP = 1e-2, 1e-6
+# A signal jumps on a side of a point where it changes by more than the residual, and so many times more than on the
+# other side.
+JUMPS = 10.0
 
 
 def held_by_bound(space: Space, x: Array) -> NDArray[np.bool_]:
@@ -146,9 +149,11 @@ class LeastSquaresProblem:
         signals = self.signals(np.concatenate([z[np.newaxis], stencil(z)]))
         here, slopes, n = signals[0], slopes_of(signals[1:]), len(z)
         low, high = self.walls(z)
-        for i in np.flatnonzero(~np.isfinite(slopes).all(axis=1) | (low > 0.0) | (high < 1.0)):
-            shift = float(np.clip(z[i], STEP, 1.0 - STEP) - z[i])
-            sides = ((signals[1 + i], shift + STEP, high[i] < 1.0), (signals[1 + n + i], shift - STEP, low[i] > 0.0))
+        shifts = np.clip(z, STEP, 1.0 - STEP) - z
+        ahead, behind = jumps_of(self.measured - here, signals[1 : 1 + n] - here, signals[1 + n :] - here)
+        ahead, behind = ahead & (shifts == 0.0) | (high < 1.0), behind & (shifts == 0.0) | (low > 0.0)
+        for i in np.flatnonzero(~np.isfinite(slopes).all(axis=1) | ahead | behind):
+            sides = ((signals[1 + i], shifts[i] + STEP, ahead[i]), (signals[1 + n + i], shifts[i] - STEP, behind[i]))
             quotients = [(signal - here) / step for signal, step, is_over in sides
                          if step != 0.0 and not is_over and np.isfinite(signal).all()]  # fmt: skip
             slopes[i] = quotients[0] if quotients and np.isfinite(here).all() else 0.0
@@ -159,6 +164,16 @@ def stencil(z: Array) -> Array:
     """Return the candidates of central differences about z, moved inside the box, (2 n_free, n_free)."""
     centre, moves = np.clip(z, STEP, 1.0 - STEP), STEP * np.eye(len(z))
     return np.concatenate([centre + moves, centre - moves])
+
+
+def jumps_of(residual: Array, ahead: Array, behind: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Tell of the changes of a signal on both sides of a point, (n, n_samples), which lie over a jump, (n,) each.
+
+    A sampled control acts a whole period later where it misses its sample.
+    """
+    left = float(np.linalg.norm(residual))
+    one, other = (np.linalg.norm(change, axis=-1) for change in (ahead, behind))
+    return (one > left) & (one > JUMPS * other), (other > left) & (other > JUMPS * one)
 
 
 def slopes_of(signals: Array) -> Array:

@@ -42,6 +42,8 @@ WRONG_TOLERANCE = 3.0
 FEWEST_OF_RESIDUAL = 10.0
 # By which factor an unknown that must not move is more precise than the records make it: rounding stays far below 1.
 IMMOVABLE = 1e9
+# What rounding takes of the information on one unknown: columns that are nearly alike stay apart by so much.
+ROUNDING = 1e-13
 # Largest exponent: exp(500) is still far from overflow.
 LARGEST_EXPONENT = 500.0
 LOG_2, LOG_2PI = float(np.log(2.0)), float(np.log(2.0 * np.pi))
@@ -145,7 +147,7 @@ class Expansion:
     @cached_property
     def precision(self) -> Array:
         """Prior precision of all unknowns."""
-        n_others = self.fit.columns.shape[1] + self.doubts.shape[1]
+        n_others = len(self.fit.others) + self.doubts.shape[1]
         return np.concatenate([2.0 * np.pi * self.density[self.kept] ** 2, np.ones(n_others)])
 
     @cached_property
@@ -168,7 +170,12 @@ class Expansion:
 
     @cached_property
     def factor(self) -> tuple[Array, bool]:
-        return cho_factor(self.information + np.diag(self.precision), lower=True)
+        return self.factor_with(self.precision)
+
+    def factor_with(self, precision: Array) -> tuple[Array, bool]:
+        """Return the Cholesky factor of the information and some precision of the unknowns."""
+        rounding = ROUNDING * np.diag(self.information)
+        return cho_factor(self.information + np.diag(precision + rounding), lower=True)
 
     @cached_property
     def is_pushed(self) -> NDArray[np.bool_]:
@@ -183,7 +190,7 @@ class Expansion:
         if not self.is_pushed.any():
             return self.factor
         held = np.where(self.is_pushed, IMMOVABLE * (np.diag(self.information) + self.precision), 0.0)
-        return cho_factor(self.information + np.diag(self.precision + held), lower=True)
+        return self.factor_with(self.precision + held)
 
     @cached_property
     def covariance(self) -> Array:

@@ -102,9 +102,12 @@ class Fit:
         """Whitened derivatives of the signal by z, (n_samples, n_free); most models of a search are never asked."""
         return self.records.plain.residual_and_slopes(self.z)[1]
 
-    @cached_property
+    @property
     def columns(self) -> Array:
-        """What one prior deviation of each further unknown does to the whitened signal, (n_samples, n_unknowns)."""
+        """What one prior deviation of each further unknown does to the whitened signal, (n_samples, n_unknowns).
+
+        Copied each time: kept with every fit of a search it would take a third of the memory.
+        """
         return np.array([f.column for f in self.others]).reshape(len(self.others), len(self.residual)).T
 
     @cached_property

@@ -26,6 +26,7 @@ from armid.estimation.least_squares import (
     Descent,
     LeastSquaresProblem,
     forward_slopes,
+    jumps_of,
     promised_fall,
     step_in_box,
 )
@@ -318,11 +319,7 @@ def columns_about(
     kept: columns that are known.
     """
     stepped = [i for i, u in enumerate(unknowns) if u.name not in kept and u.column is None]
-    steps = UNKNOWN_STEP * np.eye(len(values))[stepped]
-    points = np.vstack([values - steps, values + steps])
-    below, above = np.split(residuals_at(base, unknowns, points, np.tile(z, (len(points), 1))), 2)
-    # one-sided differences of a curved answer would separate a constant from a parameter that does the same
-    by_steps = dict(zip(stepped, (below - above) / (2.0 * UNKNOWN_STEP), strict=True))
+    by_steps = stepped_columns(base, unknowns, values, z, stepped) if stepped else {}
 
     def column(i: int, unknown: Unknown) -> Array:
         if unknown.name in kept:
@@ -334,3 +331,18 @@ def columns_about(
 
     columns = np.array([column(i, u) for i, u in enumerate(unknowns)]).reshape(len(unknowns), base.measured.size)
     return np.where(np.isfinite(columns).all(axis=1, keepdims=True), columns, 0.0).T
+
+
+def stepped_columns(
+    base: WhiteRecords, unknowns: Sequence[Unknown], values: Array, z: Array, stepped: Sequence[int]
+) -> dict[int, Array]:
+    """Return what `columns_about` does of some unknowns, by differences to both sides that do not jump."""
+    steps = UNKNOWN_STEP * np.eye(len(values))[stepped]
+    points = np.vstack([values, values + steps, values - steps])
+    here, *sides = residuals_at(base, unknowns, points, np.tile(z, (len(points), 1)))
+    ahead, behind = np.reshape(sides, (2, len(stepped), len(here)))
+    over_ahead, over_behind = jumps_of(here, ahead - here, behind - here)
+    # one-sided differences of a curved answer would separate a constant from a parameter that does the same
+    rises = np.where(over_ahead[:, np.newaxis], here, ahead) - np.where(over_behind[:, np.newaxis], here, behind)
+    runs = UNKNOWN_STEP * (2.0 - over_ahead - over_behind)
+    return dict(zip(stepped, -rises / runs[:, np.newaxis], strict=True))
