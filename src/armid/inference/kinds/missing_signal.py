@@ -119,10 +119,15 @@ def missing_from(lacking: Fit, library: Library) -> Missing:
     return Missing(lacking, tuple(shown), tuple(signals), tuple(dependences(segments)))
 
 
-def segments_about(records: WhiteRecords, values: Mapping[str, float], library: Library) -> list[Segment]:
-    """Return every piece of the train records about values of the free parameters, SI, with gains and motions."""
+def segments_about(
+    records: WhiteRecords, values: Mapping[str, float], library: Library, port: str = ""
+) -> list[Segment]:
+    """Return every piece of the train records about values of the free parameters, SI, with gains and motions.
+
+    port: at which alone gains are wanted, "" for all.
+    """
     tested, levels = library.with_test_signals(records.model), [level.rms for level in records.data.levels]
-    x, ports = free_values(records, values), list(records.model.plant.ports)
+    x, ports = free_values(records, values), [port] if port else list(records.model.plant.ports)
     candidate = candidate_at(records, values)
     return motions(records.model, candidate, segments(tested, records.space, x, records.replays, levels, ports))
 

@@ -38,10 +38,13 @@ class Signals:
 
 
 @lru_cache(maxsize=4)
-def signals_without_form(fit: Fit, library: Library) -> Signals:
-    """Return the columns of signals at every port, scaled so that each moves all records by the noise rms."""
+def signals_without_form(fit: Fit, library: Library, port: str = "") -> Signals:
+    """Return the columns of signals at a port, "" for all, scaled so that each moves all records by the noise rms.
+
+    Each port costs a simulation for every knot of every piece.
+    """
     records, n = fit.records, len(fit.residual)
-    segments = segments_about(records, fit.values, library)
+    segments = segments_about(records, fit.values, library, port)
     if sum(len(s.residual) for s in segments) != n:
         return Signals({})
     level = np.repeat([level.rms for level in records.data.levels], [sum(lengths) for lengths in records.data.lengths])
@@ -55,15 +58,15 @@ def signals_without_form(fit: Fit, library: Library) -> Signals:
 
     columns: dict[tuple[str, str], Array] = {}
     duration = float(np.median([s.knots[-1] - s.knots[0] for s in segments]))
-    for port in segments[0].gains:
+    for place in segments[0].gains:
         for share in LENGTHS:
-            columns[port, f"{OVER_TIME} ({share:g} of a record)"] = white(block_diag(*(
-                s.gains[port] @ process(s.knots, share * duration, MOST_IN_TIME) for s in segments)))  # fmt: skip
+            columns[place, f"{OVER_TIME} ({share:g} of a record)"] = white(block_diag(*(
+                s.gains[place] @ process(s.knots, share * duration, MOST_IN_TIME) for s in segments)))  # fmt: skip
         for variable in segments[0].variables:
             for factor in segments[0].factors:
                 if variable not in (factor, OVER_TIME):
                     name = variable if factor == "1" else f"{variable} x {factor}"
-                    columns[port, name] = white(over_variable(segments, port, variable, factor))
+                    columns[place, name] = white(over_variable(segments, place, variable, factor))
     sizes = {key: float(np.sqrt(np.sum(column**2) / n)) for key, column in columns.items()}
     return Signals({key: column / sizes[key] for key, column in columns.items()
                     if np.isfinite(sizes[key]) and sizes[key] > 0.0})  # fmt: skip
@@ -122,9 +125,8 @@ def refit(
     None where it diverges, or where even so more than a limit is left.
     """
     again, scale = fit, ahead.best(1)[0][1]
-    for _ in range(2):
-        signals = signals_without_form(without_cover(again), library).columns
-        columns = signals.get(which)
+    for port in ("", which[0]):
+        columns = signals_without_form(without_cover(again), library, port).columns.get(which)
         if columns is None:
             return None
         cover = Cover.of(scale * columns)
@@ -135,7 +137,8 @@ def refit(
         again = tried
     # The likeliest variable is a guess, and by a wrong one a model with wrong parameters can leave noise alone: its
     # variance once more, spread evenly over the curves of all variables at all ports.
-    curves = [column for (_, variable), column in signals.items() if not variable.startswith(OVER_TIME)]
+    known = signals_without_form(fit, library).columns
+    curves = [column for (_, variable), column in known.items() if not variable.startswith(OVER_TIME)]
     if not curves:
         return again
     return with_cover(again, cover.with_elsewhere(scale / np.sqrt(len(curves)) * np.hstack(curves)))
