@@ -123,18 +123,18 @@ class Residuals:
         return [x if rho == 0.0 else np.append(x[:1], x[1:] - rho * x[:-1]) for x, rho in pairs]
 
     @cached_property
-    def rounded(self) -> list[list[Array]]:
-        """What sensors that round leave of the simulated motion, as `renewed`, in each of some draws of their noise.
+    def rounded(self) -> Array:
+        """What sensors that round leave of the simulated motion, whitened, in draws of their noise, (n, n_samples).
 
         A slow motion passes their steps in a saw tooth, and where it stands their error stays: such noise has a colour
-        that changes with the motion. Empty where no sensor rounds, or where the noise is more than that of white ones.
+        that changes with the motion. Empty where no sensor rounds, or where its noise has a colour of its own.
         """
         levels, sensors = self.data.levels, [r.record.signals[0].sensor for r in self.replays]
-        is_white = all(not (len(level.terms) or level.growth) for level in levels) and not self.data.inputs_count
+        is_white = all(not (len(level.terms) or level.growth) for level in levels)
         if not is_white or not any(s.step for s in sensors):
-            return []
+            return np.empty((0, len(self.residual)))
         rng = np.random.default_rng(0)
-        sizes = [level.rms if self.data.known else rms(raw) for level, raw in zip(levels, self.raw, strict=True)]
+        sizes = [level.rms if self.data.sized else rms(raw) for level, raw in zip(levels, self.raw, strict=True)]
         fine = [np.sqrt(max(size**2 - s.rounding**2, 0.0)) for size, s in zip(sizes, sensors, strict=True)]
         counted = [
             self.window(r) or int(level.alternation > 0.0) for r, level in zip(self.replays, levels, strict=True)
@@ -145,8 +145,8 @@ class Residuals:
                       sensor.reading(y + size * rng.standard_normal(len(y)), float(r.measured[0])) - y
                       for r, over, sensor, y, size
                       in zip(self.replays, counted, sensors, self.simulated, fine, strict=True)]  # fmt: skip
-            draws.append(self.without_memory(self.data.white(errors)))
-        return draws
+            draws.append(self.data.white(errors))
+        return np.array(draws)
 
     def window(self, replay: Replay) -> int:
         """Return over how many samples the model holds an output to be the mean, 0 where it does not."""
@@ -397,7 +397,8 @@ def time_tests(seen: Residuals) -> Iterator[Finding]:
         parts = [without_lines(p, hum, r.spacing) for p, r in zip(parts, seen.data.each, strict=True)]
     lags = min(LAGS, *(len(p) // 4 for p in parts))
     free = lags * len(parts)
-    expected = max(float(np.mean([memory_square(draw, lags) for draw in seen.rounded] or [free])), free)
+    drawn = map(seen.without_memory, seen.rounded)
+    expected = max(float(np.mean([memory_square(draw, lags) for draw in drawn] or [free])), free)
     ratio = memory_square(parts, lags) / expected
     yield Finding("autocorrelation", f"{lags} lags", ratio, float(chdtrc(free, ratio * free)))
 
@@ -441,8 +442,11 @@ def structure(seen: Residuals, where: str, place: NDArray[np.int64], samples: ND
     indicators = np.asarray(place[:, np.newaxis] == np.unique(place[samples]), dtype=np.float64)
     indicators *= samples[:, np.newaxis]
     white = seen.data.white(seen.data.by_record(indicators.T)).T
-    along, rank = square_along(beyond(seen.basis, white), seen.residual)
-    square = along / (1.0 if seen.data.sized else float(np.mean(seen.residual**2)))
+    columns, signals = beyond(seen.basis, white), [seen.residual, *seen.rounded]
+    along, (rank, *_) = zip(*(square_along(columns, x) for x in signals), strict=True)
+    square, *drawn = along if seen.data.sized else (a / np.mean(x**2) for a, x in zip(along, signals, strict=True))
+    # what a sensor rounds away of the motion may depend on it as well
+    square /= max(1.0, float(np.mean(drawn or [rank])) / rank)
     if not seen.data.sized:
         # Neighbours tell the same: of the residual's own scatter only the independent samples count.
         square *= seen.data.independent(seen.residual) / len(seen.residual)
@@ -479,11 +483,13 @@ def band_tests(seen: Residuals) -> Iterator[Finding]:
              for r, n in zip(seen.data.each, levels, strict=True)]  # fmt: skip
     rests = spectra(still, seen, hum) if coloured else {}
     flat = 1.0 if seen.data.sized else float(np.mean(np.concatenate(seen.renewed) ** 2))
-    drawn = [] if coloured else [spectra(draw, seen, hum) for draw in seen.rounded]
-    mean = float(np.mean(np.concatenate(list(chain.from_iterable(seen.rounded))) ** 2)) if drawn else 1.0
+    draws = [] if coloured else [seen.without_memory(draw) for draw in seen.rounded]
+    drawn = [spectra(draw, seen, hum) for draw in draws]
+    mean = float(np.mean(np.concatenate(list(chain.from_iterable(draws))) ** 2)) if drawn else 1.0
     shapes = {band: float(np.mean([np.mean(one[band]) for one in drawn])) if drawn else 1.0 for band in left}
-    if not seen.data.sized:  # a sensor that rounds is not the only noise
-        shapes = {band: max(shape / mean, 1.0) for band, shape in shapes.items()}
+    if not seen.data.known:  # a sensor that rounds is not the only noise
+        scale = 1.0 if seen.data.sized else mean
+        shapes = {band: max(shape / scale, 1.0) for band, shape in shapes.items()}
     highest = max(0.5 / record.spacing for record in seen.data.each)
     for band, values in sorted(left.items()):
         other = rests.get(band, [])
