@@ -129,6 +129,30 @@ def test_what_an_encoder_rounds_away_of_a_slow_motion_is_no_discrepancy(tmp_path
     assert found.inference.probabilities["unknown"] < 0.05
 
 
+def crept_records(rng, level=6.0, width=0.002, step_mm=0.5):
+    """Tables of four records under steps of force; where friction holds the carriage it creeps. Nothing is noise."""
+
+    def rates(x, force):
+        return np.array([x[1], (force - DAMPING * x[1] - level * np.tanh(x[1] / width)) / MASS])
+
+    for _ in range(4):
+        force = np.repeat(rng.uniform(-9.0, 9.0, 10), 120) * np.repeat(rng.choice([1.0, 0.6], 10), 120)
+        force = np.where(np.arange(1200) < 100, 0.0, np.round(force, 2))
+        position = 1e3 * moved(rates, np.repeat(force, 20), 0.005 / 20, (0.0, 0.0), "zero", 1)[::20, 0]
+        yield {"time_s": 0.005 * np.arange(1200), "force_N": force,
+               "position_mm": step_mm * np.round(position / step_mm)}  # fmt: skip
+
+
+def test_what_an_encoder_rounds_away_where_friction_lets_a_machine_creep_is_no_discrepancy(tmp_path):
+    """Its error keeps its sign for seconds, and hangs on the motion to less than a step."""
+    held = replace(CARRIAGE, inputs=(Input("force", "N", ("force_N",), hold="zero"),))
+    records = campaign(tmp_path, held, crept_records(np.random.default_rng(61)))
+    found = close_loop(records.model() + EFFECTS["coulomb"], records, {"quadratic_drag": EFFECTS["quadratic_drag"]})
+    assert found.verdict == "no_discrepancy"
+    assert found.inference.probabilities["unknown"] < 0.05
+    assert found.parameters["coulomb.level"] == pytest.approx(6.0, rel=0.01)
+
+
 def test_the_number_of_teeth_is_looked_for_wherever_it_lies(tmp_path):
     records = campaign(tmp_path, CARRIAGE, toothed_records(np.random.default_rng(25), 0.02, 0.008, teeth=1.5))
     library, fit = prepared(records.model(), records, {"torque_ripple": EFFECTS["torque_ripple"]})

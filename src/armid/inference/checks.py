@@ -11,10 +11,10 @@ from scipy.special import chdtrc, fdtrc
 
 from armid.engine import along
 from armid.estimation.constants import columns_of, moved_record, slopes_of_constants
-from armid.estimation.corrections import rms
 from armid.estimation.identify import JointErrors, campaign_errors
 from armid.estimation.information import start_changes
 from armid.estimation.input_noise import estimated, pooled_noise
+from armid.estimation.noise_model import NoiseModel
 from armid.inference.decisions import SIGNIFICANCE
 from armid.inference.library import Library, calibrated_replays
 from armid.inference.model import Fit, beyond, decomposed
@@ -25,7 +25,7 @@ from armid.problem.cover import Cover
 from armid.problem.problem import Replay, with_each
 from armid.problem.starts import with_starts
 from armid.record import Record
-from armid.record.sensor import memory_of
+from armid.record.sensor import Sensor, memory_of
 
 LAGS, N_BINS = 40, 12
 BANDS_HZ = (0.0, 5.0, 12.0, 25.0, 50.0, 100.0, 250.0, np.inf)
@@ -134,15 +134,15 @@ class Residuals:
         if not is_white or not any(s.step for s in sensors):
             return np.empty((0, len(self.residual)))
         rng = np.random.default_rng(0)
-        sizes = [level.rms if self.data.sized else rms(raw) for level, raw in zip(levels, self.raw, strict=True)]
-        fine = [np.sqrt(max(size**2 - s.rounding**2, 0.0)) for size, s in zip(sizes, sensors, strict=True)]
+        fine = [own_noise(level, sensor, raw, y) for level, sensor, raw, y
+                in zip(levels, sensors, self.raw, self.simulated, strict=True)]  # fmt: skip
         counted = [
             self.window(r) or int(level.alternation > 0.0) for r, level in zip(self.replays, levels, strict=True)
         ]
         draws = []
         for _ in range(N_ROUNDED):
             errors = [sensor.counting_error(y, rng.random(), over) if over and sensor.step else
-                      sensor.reading(y + size * rng.standard_normal(len(y)), float(r.measured[0])) - y
+                      rounding_error(sensor, float(r.measured[0]), y, size, rng)
                       for r, over, sensor, y, size
                       in zip(self.replays, counted, sensors, self.simulated, fine, strict=True)]  # fmt: skip
             draws.append(self.data.white(errors))
@@ -240,6 +240,34 @@ def variable_names(model: Model) -> list[str]:
     first = [n for n in (plant.aliases.get(a, a) for a in ("omega", "theta")) if n in states]
     drive = [n for n in ("voltage", "drive_effort") if n in plant.quantities]
     return [*first, *(n for n in states if n not in first), *(i.name for i in plant.inputs), *drive]
+
+
+def own_noise(level: NoiseModel, sensor: Sensor, raw: Array, motion: Array) -> float:
+    """Return the rms of the noise of a sensor before it rounds [unit of the output].
+
+    raw: what is left of a record. Where no rest tells the noise what changes from sample to sample does: the slow part
+    of a rounding error hangs on the motion to less than a step, which no fit knows.
+    """
+    if level.known:
+        return float(np.sqrt(max(level.rms**2 - sensor.rounding**2, 0.0)))
+    return float(np.sqrt(max(quick_square(raw) - quick_square(sensor.reading(motion, 0.0) - motion), 0.0)))
+
+
+def rounding_error(sensor: Sensor, known: float, motion: Array, noise: float, rng: np.random.Generator) -> Array:
+    """Return what a sensor with some noise of its own rounds away of a motion, (n_samples,).
+
+    known: one of its readings. A motion that left its start is known to less than a step, no better.
+    """
+    if not sensor.step:
+        return noise * rng.standard_normal(len(motion))
+    left = np.minimum(np.abs(motion - motion[0]) / sensor.step, 1.0)
+    likely = motion + sensor.step * (rng.random() - 0.5) * left
+    return sensor.reading(likely + noise * rng.standard_normal(len(motion)), known) - likely
+
+
+def quick_square(signal: Array) -> float:
+    """Return the mean square of white noise that changes as much from sample to sample as a signal does."""
+    return float(np.mean((signal[1:-1] - 0.5 * (signal[2:] + signal[:-2])) ** 2)) / 1.5
 
 
 @lru_cache(maxsize=16)  # many ask about the same few models; what their tests share is found once

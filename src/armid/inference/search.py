@@ -55,7 +55,8 @@ MOST_EXPANDED, MOST_EFFECTS = 16, 8
 SAMPLES, SPARED, FEWEST_EXPANDED, USUAL_CONSTANTS = 4_000, 3, 8, 10
 # Steps between samples; an expansion with more counts as several: friction as sharp as a fast machine shows it.
 USUAL_STEPS = 16.0
-# Far from the noise: expansions without a better model after which the search stops, as what is missing has no name.
+# Far from the noise: expansions without a better model after which the best one is the last that is expanded, unless
+# that leads to a better one: what is missing has no name.
 MOST_IN_VAIN = 4
 # Most expansions of a last model that was never expanded, and fits of what was only forecast and would count.
 MOST_ENDS, MOST_COUNTED = 3, 16
@@ -113,9 +114,9 @@ def expand_all(exploration: Exploration, most: int | None, until: Callable[[Fit]
     cost = exploration.library.data.n_simulated / SAMPLES * (1.0 + len(exploration.constants) / USUAL_CONSTANTS)
     fewest = 1 if exploration.is_led else FEWEST_EXPANDED
     most = most or int(np.clip(MOST_EXPANDED / cost, fewest, MOST_EXPANDED))
-    while exploration.n_expanded < most and exploration.in_vain < MOST_IN_VAIN:
+    while exploration.n_expanded < most:
         model, best = next_model(exploration), exploration.ranked()[0][0]
-        if until(exploration.fits[best]):
+        if until(exploration.fits[best]) or (exploration.in_vain >= MOST_IN_VAIN and model != best):
             return False
         if model is None:
             return True
@@ -280,7 +281,8 @@ def next_model(exploration: Exploration) -> Hypotheses | None:
     """Return the model that is to be expanded next, None where all in the window are.
 
     Where the best model leaves more than noise, the best effect-only models of each size up to its own may lead on as
-    well: a strong second effect can mislead the choice of the first. Far from the noise these come first (a beam).
+    well: a strong second effect can mislead the choice of the first. Far from the noise these come first (a beam),
+    until several in turn were expanded in vain.
     Where some records were searched first, the beam was expanded there. Models with something unknown are not expanded:
     names next to it do not count.
     """
@@ -295,7 +297,8 @@ def next_model(exploration: Exploration) -> Hypotheses | None:
         plain = [m for m, _ in ranked if all(h.kind == "effect" for h in m)]
         # an effect may show together with another only: those with one are expanded although none of them leads
         beam = [m for n in range(1, max(len(best), 1) + 1) for m in [m for m in plain if len(m) == n][:BEAM]]
-        near = [*near, *beam] if is_near(exploration) else [*beam, *near]
+        is_beam_first = not is_near(exploration) and exploration.in_vain < MOST_IN_VAIN
+        near = [*beam, *near] if is_beam_first else [*near, *beam]
     return next((m for m in near if m not in exploration.forecasts and len(m) < MOST_EFFECTS), None)
 
 
