@@ -262,7 +262,7 @@ def rounding_error(sensor: Sensor, known: float, motion: Array, noise: float, rn
         return noise * rng.standard_normal(len(motion))
     left = np.minimum(np.abs(motion - motion[0]) / sensor.step, 1.0)
     likely = motion + sensor.step * (rng.random() - 0.5) * left
-    return sensor.reading(likely + noise * rng.standard_normal(len(motion)), known) - likely
+    return np.asarray(sensor.reading(likely + noise * rng.standard_normal(len(motion)), known) - likely)
 
 
 def quick_square(signal: Array) -> float:
@@ -472,7 +472,9 @@ def structure(seen: Residuals, where: str, place: NDArray[np.int64], samples: ND
     white = seen.data.white(seen.data.by_record(indicators.T)).T
     columns, signals = beyond(seen.basis, white), [seen.residual, *seen.rounded]
     along, (rank, *_) = zip(*(square_along(columns, x) for x in signals), strict=True)
-    square, *drawn = along if seen.data.sized else (a / np.mean(x**2) for a, x in zip(along, signals, strict=True))
+    square, *drawn = (
+        along if seen.data.sized else (a / float(np.mean(x**2)) for a, x in zip(along, signals, strict=True))
+    )
     # what a sensor rounds away of the motion may depend on it as well
     square /= max(1.0, float(np.mean(drawn or [rank])) / rank)
     if not seen.data.sized:
