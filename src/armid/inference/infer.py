@@ -38,7 +38,7 @@ from armid.inference.library import Library, library_of
 from armid.inference.model import Fit, unless_diverged, with_data_of
 from armid.inference.moves import Exploration, simpler
 from armid.inference.posterior import CONSTANTS_TEXT, Posterior, posterior, spread
-from armid.inference.search import explore, is_named, without_denied
+from armid.inference.search import explore, is_named, leaders_of, without_denied
 from armid.inference.unknowns import freed
 from armid.inference.whitening import whitened, with_answers
 from armid.model import EFFECTS, Effect, Model
@@ -327,10 +327,13 @@ def infer(library: Library, declared: Fit) -> Inference:
     return inferred(library, declared, REVISIONS)
 
 
-def inferred(library: Library, declared: Fit, changes: Sequence[Revision]) -> Inference:
+def inferred(
+    library: Library, declared: Fit, changes: Sequence[Revision], led_by: Mapping[Hypotheses, Fit] | None = None
+) -> Inference:
     """Return an inference, with the first of some changes of the noise that it asks for, and those after it.
 
     Noise of the inputs counts from the first leading model on that may show it: what it does looks like many effects.
+    Models that lead before a change of the noise (led_by) are fitted after it as well.
     """
     noisy = library
 
@@ -340,20 +343,19 @@ def inferred(library: Library, declared: Fit, changes: Sequence[Revision]) -> In
         noisy = with_input_noise(library, fit) if with_exact_inputs in changes else library
         return noisy is not library
 
-    exploration = explore(library, declared, inputs_act)
+    exploration = explore(library, declared, inputs_act, led_by)
     if noisy is not library:
-        return inferred(noisy, declared_again(noisy, declared), changes)
+        return inferred(noisy, declared_again(noisy, declared), changes, leaders_of(exploration))
     inference = Inference(exploration, posterior(exploration))
     for change in changes:
         other = change(library, inference)
         if other is library:
             continue
+        left = [c for c in changes if c is not change]
         if other.declared is library.declared and other.own_shapes_free == library.own_shapes_free:
-            again = declared_again(other, declared)
-        else:
-            other, again = with_fitting_shapes(*with_scales(other))
-            other = searched(other, again)
-        return inferred(other, again, [c for c in changes if c is not change])
+            return inferred(other, declared_again(other, declared), left, leaders_of(exploration))
+        other, again = with_fitting_shapes(*with_scales(other))
+        return inferred(searched(other, again), again, left)
     return inference
 
 

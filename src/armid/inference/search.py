@@ -68,13 +68,20 @@ N_RIVALS = 3
 BEAM = 3
 
 
-def explore(library: Library, declared: Fit, until: Callable[[Fit], bool] = lambda _: False) -> Exploration:
+def explore(
+    library: Library,
+    declared: Fit,
+    until: Callable[[Fit], bool] = lambda _: False,
+    led_by: Mapping[Hypotheses, Fit] | None = None,
+) -> Exploration:
     """Return the models that were explored from the declared one.
 
-    declared: its fit. until: whether a fit that leads, after an expansion, is reason to stop at once.
+    declared: its fit. until: whether a fit that leads, after an expansion, is reason to stop at once. led_by: models
+    that led with another noise of the same records; they are fitted here as well.
     """
     exploration = begun(library, declared)
     take_from_some_records(exploration)
+    take_carried(exploration, led_by or {}, with_data_of)
     if expand_all(exploration, None, until):
         add_unknown(exploration)
     if until(exploration.fits[exploration.ranked()[0][0]]):
@@ -165,12 +172,18 @@ def take_from_some_records(exploration: Exploration) -> None:
     look(some)
     expand_all(some, None)
     finish(some)
-    leaders: dict[Hypotheses, Fit] = {}
-    for model, _ in some.ranked():
-        leaders.setdefault(frozenset(h for h in model if h.kind == "effect"), some.fits[model])
-    leaders.pop(frozenset(), None)
-    take_carried(exploration, dict(list(leaders.items())[:BEAM]), with_data_of)
+    leaders = leaders_of(some)
+    take_carried(exploration, leaders, with_data_of)
     exploration.is_led = bool(leaders)
+
+
+def leaders_of(exploration: Exploration) -> dict[Hypotheses, Fit]:
+    """Return the best models without something unknown, each by its effects alone."""
+    leaders: dict[Hypotheses, Fit] = {}
+    for model in [m for m, _ in exploration.ranked() if is_named(m)]:
+        leaders.setdefault(frozenset(h for h in model if h.kind == "effect"), exploration.fits[model])
+    leaders.pop(frozenset(), None)
+    return dict(list(leaders.items())[:BEAM])
 
 
 def some_records(data: WhitenedData) -> list[int] | None:
