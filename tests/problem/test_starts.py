@@ -6,7 +6,7 @@ import pytest
 from armid import identify
 from armid.inference.kinds.faults import Fault
 from armid.model import EFFECTS, Model
-from armid.problem.problem import replays
+from armid.problem.problem import replays, signals_of
 from armid.problem.space import space_of
 from armid.problem.starts import with_starts
 from armid.record import read_campaign
@@ -39,6 +39,17 @@ def test_a_sensor_that_is_off_starts_no_record_in_motion(campaign):
     assert found.holdout.rmse < 1.05 * NOISE
     for name, truth in (("drum", DRUM), ("viscous.slope", FRICTION), ("gyro_bias.bias", OFFSET)):
         assert found.parameters[name].low < truth < found.parameters[name].high
+
+
+def test_a_candidate_whose_sensor_is_off_starts_where_that_sensor_shows_it(campaign):
+    """The starts are those of a candidate without an offset, and far from the noise hold every other one there."""
+    model = Model(winch) + EFFECTS["viscous"] + EFFECTS["gyro_bias"]
+    values = {"drum": 0.8 * DRUM, "viscous.slope": FRICTION, "gyro_bias.bias": 0.0}
+    wrong = np.array([values[name] for name in model.parameters])
+    right = np.array([(values | {"drum": DRUM, "gyro_bias.bias": OFFSET})[name] for name in model.parameters])
+    (replay,) = with_starts(replays(campaign.train, model, space_of(model)), wrong)
+    (signal,) = signals_of([replay], right[np.newaxis])
+    assert np.sqrt(np.mean((replay.measured - signal) ** 2)) < 1.3 * NOISE
 
 
 def test_without_its_offset_a_record_starts_elsewhere(campaign):

@@ -208,14 +208,17 @@ class Start:
 
     def answer(self, constants: Array, slopes: Array, misfit: float) -> tuple[Array, Array]:
         """Return gain and offset of a step, (n_constants, n_seen) and (n_constants,); misfit: that is left."""
-        shown, width = self.shown
-        pull = misfit / width**2 * (shown - constants)
+        pull = self.pull(misfit) * (self.shown[0] - constants)
         both = np.linalg.solve(self.normal(slopes, misfit), np.column_stack([slopes, pull]))
         return np.asarray(both[:, :-1]), np.asarray(both[:, -1])
 
+    def pull(self, misfit: float) -> Array:
+        """Return how strongly the start that the reader saw holds each constant, times the misfit, (n_constants,)."""
+        return np.asarray(misfit / self.shown[1] ** 2)
+
     def normal(self, slopes: Array, misfit: float) -> Array:
         """Return the matrix of the normal equations, times the misfit, (n_constants, n_constants)."""
-        return np.asarray(slopes @ slopes.T + np.diag(misfit / self.shown[1] ** 2))
+        return np.asarray(slopes @ slopes.T + np.diag(self.pull(misfit)))
 
     def placed(self, candidate: Array) -> Piece:
         """Return the piece from the start that belongs to a candidate, see `with_starts`."""
@@ -254,12 +257,11 @@ class Start:
         population = candidate[np.newaxis]
         (first,) = self.signals(self.constants[np.newaxis], population)[:, :, 0].T
         constants = replace(self, off=self.off_by(first)).shown[0]
-        slopes = self.linear(constants, population)[1]
+        signals, slopes = self.linear(constants, population)
         if not np.isfinite(slopes).all():
             return self.piece
-        return self.corrected(
-            constants, slopes, np.zeros((len(constants), self.weights.size)), np.zeros(len(constants))
-        )
+        still = np.zeros((len(constants), self.weights.size)), np.zeros(len(constants))
+        return self.corrected(constants, signals, slopes, *still, self.by_outputs)
 
     def fitted(self, candidate: Array) -> Piece:
         """Return the piece from the best start of a candidate, as it is where the candidate diverges."""
@@ -284,13 +286,18 @@ class Start:
                 break
         if not np.isfinite(slopes).all():
             return self.piece
-        gain, offset = start.answer(constants, start.seen_slopes(slopes)[:, 0], misfit)
-        return self.corrected(constants, slopes, gain, offset)
+        seen = start.seen_slopes(slopes)[:, 0]
+        by_first = np.linalg.solve(start.normal(seen, misfit), start.pull(misfit)[:, np.newaxis] * self.by_outputs)
+        return self.corrected(constants, signals, slopes, *start.answer(constants, seen, misfit), by_first)
 
-    def corrected(self, constants: Array, slopes: Array, gain: Array, offset: Array) -> Piece:
+    def corrected(
+        self, constants: Array, signals: Array, slopes: Array, gain: Array, offset: Array, by_first: Array
+    ) -> Piece:  # fmt: skip
         """Return the piece from one start, with how far others move it from there; gain: of samples over the noise."""
-        gain = self.white(gain) * self.weights
-        correction = StartCorrection(self.places, slopes[:, :, 0], gain, offset, self.measured, self.samples)
+        gain, first = self.white(gain) * self.weights, signals[:, 0, 0]
+        correction = StartCorrection(
+            self.places, slopes[:, :, 0], gain, offset, by_first, first, self.measured, self.samples
+        )
         known = dict(zip(self.names, map(float, constants), strict=True))
         return replace(self.piece.with_constants(known), correction=correction)
 
@@ -307,13 +314,27 @@ class Start:
 
         The plant's own outputs are functions of its states: what a model shows besides is what its sensors are off by.
         """
-        plant = self.ready.model.plant
-        outputs = VisibleOutputs(plant, self.piece.manoeuvre.constants)
         start = dict(zip(self.names, map(float, self.constants), strict=True))
-        simulated = {plant.outputs[place].name: float(y) for place, y in zip(self.places, first, strict=True)}
-        by_sensors = {name: simulated[name] - own for name, own in outputs.at(start).items() if name in simulated}
-        moved = outputs.moved(start, by_sensors)
-        return np.array([moved[name] - start[name] for name in self.names])
+        own = self.visible.at(start)
+        off = np.array([y - own.get(name, y) for name, y in zip(self.outputs, first, strict=True)])
+        return self.by_outputs @ off if off.any() and np.isfinite(off).all() else np.zeros(len(self.names))
+
+    @cached_property
+    def by_outputs(self) -> Array:
+        """How the start that the reader saw follows a change of each output, (n_constants, n_outputs)."""
+        start = dict(zip(self.names, map(float, self.constants), strict=True))
+        own = [name for name in self.outputs if name in self.visible.at(start)]
+        by_outputs = np.zeros((len(self.names), len(self.outputs)))
+        by_outputs[:, [self.outputs.index(name) for name in own]] = self.visible.by_outputs(start, own)
+        return by_outputs
+
+    @property
+    def outputs(self) -> list[str]:
+        return [self.ready.model.plant.outputs[place].name for place in self.places]
+
+    @cached_property
+    def visible(self) -> VisibleOutputs:
+        return VisibleOutputs(self.ready.model.plant, self.piece.manoeuvre.constants)
 
     def seen_slopes(self, slopes: Array) -> Array:
         shape = (len(slopes), slopes.shape[2], len(self.weights))

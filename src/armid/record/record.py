@@ -38,17 +38,21 @@ class Irregularity:
 class StartCorrection:
     """How the signals of a piece answer to its start, and how much of it a candidate lacks.
 
-    With a candidate's signals y the start moves by d = gain (x - y) + offset, x what was measured: the d that brings
-    x - y - slopes d down, of all outputs of the file together, and does not leave the start that the reader saw.
+    With a candidate's signals y the start moves by d = gain (x - y) + offset - by_first (y_0 - first), x what was
+    measured: the d that brings x - y - slopes d down, of all outputs of the file together, and does not leave the start
+    that the reader saw. Of a candidate whose sensors are off the reader saw another: its first samples y_0 are not
+    those of the candidate (first) about which this holds.
     slopes: d signal / d start constant, SI, (n_constants, n_outputs, n_samples). gain: (n_constants, n_seen); offset:
-    (n_constants,). samples: of each output, those that are seen; measured: their values, the outputs one behind the
-    other, (n_seen,).
+    (n_constants,). by_first: (n_constants, n_outputs); first: (n_outputs,). samples: of each output, those that are
+    seen; measured: their values, the outputs one behind the other, (n_seen,).
     """
 
     places: tuple[int, ...]
     slopes: Array
     gain: Array
     offset: Array
+    by_first: Array
+    first: Array
     measured: Array
     samples: tuple[Samples, ...]
 
@@ -58,6 +62,7 @@ class StartCorrection:
         seen = np.concatenate([outputs[place][:, samples] for place, samples in pairs], axis=1)
         # no matrix product: its rounding of one candidate may depend on how many others there are
         lacking = np.einsum("cn,sn->cs", self.measured - seen, self.gain) + self.offset
+        lacking -= np.einsum("oc,so->cs", outputs[list(self.places), :, 0] - self.first[:, np.newaxis], self.by_first)
         signals = outputs.copy()
         for place, slopes in zip(self.places, self.slopes.swapaxes(0, 1), strict=True):
             signals[place] += np.einsum("cs,sn->cn", lacking, slopes[:, : outputs.shape[2]])

@@ -158,19 +158,22 @@ class VisibleOutputs:
 
         The start itself where nothing changes, or where a change is not finite.
         """
-        names, step = list(start), TINY * self.plant.scales.speed
         move = np.array(list(changes.values()))
         if not (move.any() and np.isfinite(move).all()):
             return dict(start)
+        here = np.array(list(start.values()))
+        return dict(zip(start, map(float, here + self.by_outputs(start, list(changes)) @ move), strict=True))
+
+    def by_outputs(self, start: Mapping[str, float], names: Sequence[str]) -> Array:
+        """Return how a start follows changes of outputs, by least squares, (n_constants, n_outputs)."""
+        here, step = np.array(list(start.values())), TINY * self.plant.scales.speed
 
         def at(values: Array) -> Array:
-            known = self.at(dict(zip(names, map(float, values), strict=True)))
-            return np.array([known[name] for name in changes])
+            known = self.at(dict(zip(start, map(float, values), strict=True)))
+            return np.array([known[name] for name in names])
 
-        here = np.array(list(start.values()))
-        sides = [at(here + step * one) - at(here - step * one) for one in np.eye(len(names))]
-        moved = here + np.linalg.lstsq(np.array(sides).T / (2.0 * step), move, rcond=1e-12)[0]
-        return dict(zip(names, map(float, moved), strict=True))
+        sides = [at(here + step * one) - at(here - step * one) for one in np.eye(len(here))]
+        return np.asarray(np.linalg.pinv(np.array(sides).T / (2.0 * step), rcond=1e-12))
 
 
 # A window of smoothing holds only what a polynomial of one of these degrees describes ...
