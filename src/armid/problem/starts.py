@@ -287,8 +287,9 @@ class Start:
         if not np.isfinite(slopes).all():
             return self.piece
         seen = start.seen_slopes(slopes)[:, 0]
-        by_first = np.linalg.solve(start.normal(seen, misfit), start.pull(misfit)[:, np.newaxis] * self.by_outputs)
-        return self.corrected(constants, signals, slopes, *start.answer(constants, seen, misfit), by_first)
+        by_reader = np.linalg.solve(start.normal(seen, misfit), np.diag(start.pull(misfit)))
+        answer = start.answer(constants, seen, misfit)
+        return self.corrected(constants, signals, slopes, *answer, np.asarray(by_reader @ self.by_outputs))
 
     def corrected(
         self, constants: Array, signals: Array, slopes: Array, gain: Array, offset: Array, by_first: Array
