@@ -258,7 +258,7 @@ def steps_of(
 ) -> tuple[Step, ...]:  # fmt: skip
     """Return a step for each effect of the model in force; a model of faults alone has none.
 
-    instead: see `constants_instead`.
+    instead: see `constants_instead`. Where something unknown acts nothing tells whether a constant does as well.
     """
     steps, exploration = [], inference.exploration
     candidates, fit = exploration.library.candidates, exploration.fits[inference.in_force]
@@ -270,7 +270,8 @@ def steps_of(
         names = tuple(inference.partners(inference.in_force, hypothesis))
         settled = fit.has_arrived and not fit.is_at_a_limit(hypothesis.means)
         port = ", ".join(candidates[hypothesis.means].adds)
-        constants = instead(exploration, inference.in_force, hypothesis)
+        is_wrong = inference.posterior.unknown_is_likely
+        constants = {} if is_wrong else instead(exploration, inference.in_force, hypothesis)
         is_claimed = p >= CLAIMED and settled and not constants
         steps.append(Step(hypothesis.name, port, names, is_claimed, p, after, hypothesis.form, constants))
     return tuple(steps)
