@@ -247,6 +247,36 @@ def test_where_more_than_noise_is_left_the_best_of_each_size_lead_on(monkeypatch
     assert next_model(exploration({large: 0.0}, (), False, monkeypatch)) is None
 
 
+def test_a_search_with_another_noise_goes_on_from_what_led_before_each_name_in_one_form(monkeypatch):
+    """The beam, too, has one form of a name: other forms of it leave another effect no place."""
+    fault, signal = Hypothesis("record", "late"), Hypothesis("unknown", "torque")
+    ranked = [frozenset({signal}), frozenset({*model("a"), fault}), model("a"), frozenset(), *map(model, "bcd")]
+    before = exploration({}, monkeypatch=monkeypatch)
+    before.fits = {m: Mock() for m in ranked}
+    monkeypatch.setattr(before, "ranked", lambda: [(m, -float(i)) for i, m in enumerate(ranked)])
+    leaders = search.leaders_of(before)
+    assert list(leaders) == [model("a"), model("b"), model("c")]
+    assert leaders[model("a")] is before.fits[ranked[1]]
+    begun = exploration({"": 0.0}, monkeypatch=monkeypatch)
+    taken, looked = Mock(), Mock(side_effect=AssertionError)
+    for name, one in {
+        "begun": lambda *_: begun,
+        "expand_all": Mock(return_value=False),
+        "finish_all": Mock(),
+        "some_records": lambda _: None,
+        "take_carried": taken,
+        "add_unknown": Mock(),
+        "take_from_some_records": looked,
+        "fit_what_counts": Mock(return_value=False),
+    }.items():
+        monkeypatch.setattr(search, name, one)
+    begun.library, begun.forecasts = Mock(), {frozenset(): []}
+    assert search.explore(Mock(), Mock(), led_by=leaders) is begun
+    assert taken.call_args.args[:2] == (begun, leaders)
+    forms = [frozenset([Hypothesis("effect", "a", form)]) for form in ("root", "tanh", "sharp")]
+    assert search.one_form_each([*forms, model("b")]) == [forms[0], model("b")]
+
+
 def test_a_fit_from_a_nearer_start_takes_the_place_of_a_local_one_and_its_evidence_is_its_own(monkeypatch):
     local, better = Mock(chi2=120.0), Mock(chi2=100.0)
     monkeypatch.setattr(moves, "expansion_of", lambda fit, *_: fit)

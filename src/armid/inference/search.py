@@ -77,11 +77,13 @@ def explore(
     """Return the models that were explored from the declared one.
 
     declared: its fit. until: whether a fit that leads, after an expansion, is reason to stop at once. led_by: models
-    that led with another noise of the same records; they are fitted here as well.
+    that led with another noise of the same records; the search goes on from these.
     """
     exploration = begun(library, declared)
-    take_from_some_records(exploration)
-    take_carried(exploration, led_by or {}, with_data_of)
+    if led_by:
+        go_on_from(exploration, led_by)
+    else:
+        take_from_some_records(exploration)
     if expand_all(exploration, None, until):
         add_unknown(exploration)
     if until(exploration.fits[exploration.ranked()[0][0]]):
@@ -154,6 +156,14 @@ def look(exploration: Exploration) -> None:
     expand_all(exploration, 1)
     if not is_near(exploration):
         take_from_short_pieces(exploration)
+
+
+def go_on_from(exploration: Exploration, leaders: Mapping[Hypotheses, Fit]) -> None:
+    """Take models that led with another noise: some of the records, or pieces of them, need no second look."""
+    exploration.is_led = some_records(exploration.library.data) is not None
+    if not exploration.is_led:
+        expand_all(exploration, 1)
+    take_carried(exploration, leaders, with_data_of)
 
 
 def take_from_some_records(exploration: Exploration) -> None:
