@@ -6,6 +6,7 @@ from functools import partial
 
 import numpy as np
 
+from armid.engine import Schedule
 from armid.estimation.least_squares import descend
 from armid.inference.candidates import EffectKey
 from armid.inference.checks import square_along, train_residuals
@@ -27,6 +28,7 @@ from armid.inference.model import (
 from armid.inference.unknowns import freed, moved, projected
 from armid.inference.whitening import WhiteRecords
 from armid.model import Array
+from armid.problem.problem import ReadyRecord, by_record, with_each
 
 # Shares of the range over which a strength is tried: a slope, and two secants where the response is not linear.
 SLOPE = 1e-3
@@ -139,13 +141,14 @@ def waves_tried(
 
     full = {n: max(ends(n), key=lambda end: abs(end - strengths[n])) for n in strengths}
     (waves,), (low, high) = shapes, ends(shapes[0])
-    longest = max(float(np.ptp(part)) for part in fit.records.data.by_record(travel))
+    parts = fit.records.data.by_record(travel)
+    longest, fastest = (max(float(np.max(far(part))) for part in parts) for far in (np.ptp, lambda x: abs(np.diff(x))))
     n_waves = int(np.clip((high - low) * longest / np.pi, N_WAVES, MOST_WAVES))
     numbers, squares = np.linspace(low, high, n_waves), list[float]()
     for some in np.array_split(numbers, -(-n_waves // WAVES_AT_ONCE)):
         grid = [Activation(strengths | {waves: float(w), n: end}, strengths, SLOPE)
                 for w in some for n, end in full.items()]  # fmt: skip
-        moved = np.nan_to_num(responses(fit, records, grid))
+        moved = np.nan_to_num(responses(fit, in_steps_of_waves(records, fit, fastest * some[-1]), grid))
         squares += [square_along(beyond(fit.basis, columns.T), fit.residual)[0]
                     for columns in moved.reshape(len(some), len(strengths), -1)]  # fmt: skip
     # neighbours of a peak lead to it
@@ -153,6 +156,24 @@ def waves_tried(
     peaks = np.flatnonzero((around[1:-1] >= around[:-2]) & (around[1:-1] >= around[2:]))
     tried = peaks[np.argsort(-np.asarray(squares)[peaks])[:N_WAVES]]
     return {waves: numbers[np.sort(tried)]}, n_waves / len(tried)
+
+
+def in_steps_of_waves(records: WhiteRecords, fit: Fit, phase: float) -> WhiteRecords:
+    """Return a problem in steps as coarse as those of a fit, but with four in each period of a wave, to rank waves.
+
+    phase: by which the fastest wave turns from sample to sample [rad]. At the strengths that may be found it is
+    simulated as its noise asks for, in many more steps.
+    """
+    own = {ready.record.file: ready.calibrations for ready in by_record(fit.records.replays)}
+
+    def coarser(ready: ReadyRecord) -> ReadyRecord:
+        kept = []
+        for one, of_fit in zip(ready.calibrations, own[ready.record.file], strict=True):
+            n = max(of_fit.schedule.substeps, int(np.ceil(phase / (0.5 * np.pi))))
+            kept.append(one if one.schedule.least <= n else replace(one, schedule=Schedule(n)))
+        return replace(ready, calibrations=tuple(kept))
+
+    return replace(records, replays=with_each(records.replays, coarser))
 
 
 def records_with(fit: Fit, active: tuple[EffectKey, ...], library: Library) -> WhiteRecords:
