@@ -247,8 +247,7 @@ def test_where_more_than_noise_is_left_the_best_of_each_size_lead_on(monkeypatch
     assert next_model(exploration({large: 0.0}, (), False, monkeypatch)) is None
 
 
-def test_a_search_with_another_noise_goes_on_from_what_led_before_each_name_in_one_form(monkeypatch):
-    """The beam, too, has one form of a name: other forms of it leave another effect no place."""
+def test_a_search_with_another_noise_goes_on_from_what_led_before(monkeypatch):
     fault, signal = Hypothesis("record", "late"), Hypothesis("unknown", "torque")
     ranked = [frozenset({signal}), frozenset({*model("a"), fault}), model("a"), frozenset(), *map(model, "bcd")]
     before = exploration({}, monkeypatch=monkeypatch)
@@ -273,8 +272,6 @@ def test_a_search_with_another_noise_goes_on_from_what_led_before_each_name_in_o
     begun.library, begun.forecasts = Mock(), {frozenset(): []}
     assert search.explore(Mock(), Mock(), led_by=leaders) is begun
     assert taken.call_args.args[:2] == (begun, leaders)
-    forms = [frozenset([Hypothesis("effect", "a", form)]) for form in ("root", "tanh", "sharp")]
-    assert search.one_form_each([*forms, model("b")]) == [forms[0], model("b")]
 
 
 def test_a_fit_from_a_nearer_start_takes_the_place_of_a_local_one_and_its_evidence_is_its_own(monkeypatch):

@@ -6,7 +6,7 @@ some are searched first. The models that lead there are fitted to all records, a
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from weakref import WeakKeyDictionary
@@ -317,20 +317,12 @@ def next_model(exploration: Exploration) -> Hypotheses | None:
             and not (is_outdone(m, value, ranked) or has_expanded_form(m, value, expanded))]  # fmt: skip
     is_left = is_significant(exploration.fits[best]) and exploration.fits[best].records.data.cover is None
     if is_left and not exploration.is_led:
-        plain = one_form_each(m for m, _ in ranked if all(h.kind == "effect" for h in m))
+        plain = [m for m, _ in ranked if all(h.kind == "effect" for h in m)]
         # an effect may show together with another only: those with one are expanded although none of them leads
         beam = [m for n in range(1, max(len(best), 1) + 1) for m in [m for m in plain if len(m) == n][:BEAM]]
         is_beam_first = not is_near(exploration) and exploration.in_vain < MOST_IN_VAIN
         near = [*beam, *near] if is_beam_first else [*near, *beam]
     return next((m for m in near if m not in exploration.forecasts and len(m) < MOST_EFFECTS), None)
-
-
-def one_form_each(models: Iterable[Hypotheses]) -> list[Hypotheses]:
-    """Return the models without those that only have other forms of the names of one before them."""
-    found = dict[frozenset[tuple[str, str]], Hypotheses]()
-    for model in models:
-        found.setdefault(frozenset(h.public for h in model), model)
-    return list(found.values())
 
 
 def is_named(model: Hypotheses) -> bool:
